@@ -71,12 +71,12 @@ def take(contacts: Contacts, rows: Ints) -> Contacts:
 def joined(parts: Sequence[Contacts]) -> Contacts:
     """Concatenate the contacts of all parts."""
     return Contacts(
-        np.concatenate([part.bodies for part in parts]),
-        np.concatenate([part.key for part in parts]),
-        np.concatenate([part.frame for part in parts]),
-        np.concatenate([part.area for part in parts]),
-        np.concatenate([part.arm for part in parts]),
-        csr_array(vstack([part.weights for part in parts], format="csr")),
+        np.concatenate([contacts.bodies for contacts in parts]),
+        np.concatenate([contacts.key for contacts in parts]),
+        np.concatenate([contacts.frame for contacts in parts]),
+        np.concatenate([contacts.area for contacts in parts]),
+        np.concatenate([contacts.arm for contacts in parts]),
+        csr_array(vstack([contacts.weights for contacts in parts], format="csr")),
     )
 
 

@@ -154,7 +154,7 @@ class Detector:
         limit = limit + (reach[first] + reach[second])
         balls = round_[first] | round_[second]
         hint = self._hints.of(key)
-        near = np.where(balls, -np.inf, limit)
+        nearest = np.where(balls, -np.inf, limit)
 
         # points over the area are kept where the two faces are equally deep, so that they keep their names
         plane = FLAT if self.placement == Placement.AREA else SAME_PLANE
@@ -162,7 +162,7 @@ class Detector:
         def part(a: int, b: int) -> tuple[Ints, Ints, Array]:
             """Return the separating axes of the pairs from a to b."""
             axes: tuple[Ints, Ints, Array] = separating_axes(
-                shapes[a:b], near[a:b], hint[a:b], plane, placed.shapes
+                shapes[a:b], nearest[a:b], hint[a:b], plane, placed.shapes
             )
             return axes
 
@@ -277,10 +277,10 @@ class Detector:
         key = _pair_key(shapes, len(surfaces.body))
         if not self._cells:
             self._cells.append(face_cells(surfaces, len(state.node)))
-        found, seen = ball_contacts(
+        weighted, seen = ball_contacts(
             surfaces, placed, state, self._cells[0], shapes, key, pairs.limit[pair], gap
         )
-        return found, points.without(rows[seen])
+        return weighted, points.without(rows[seen])
 
 
 def _place(surfaces: Surfaces, state: State) -> Placed:
@@ -294,7 +294,7 @@ def _place(surfaces: Surfaces, state: State) -> Placed:
 
 def _joined(parts: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
     """Join the arrays of all parts, one after the other."""
-    return tuple(np.concatenate(one) for one in zip(*parts, strict=True))
+    return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
 
 def _pair_key(shapes: Ints, count: int) -> Ints:

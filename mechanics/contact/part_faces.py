@@ -35,12 +35,12 @@ def part_face_meshes(mesh: SolidMesh, vertices: Array, faces: Faces, start: int)
     x = mesh.nodes[mesh.facets[:, :corners]]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    near = _FACET_DISTANCE * float(np.ptp(mesh.nodes, axis=0).max())
+    tolerance = _FACET_DISTANCE * float(np.ptp(mesh.nodes, axis=0).max())
     cut_meshes = []
     for face in faces:
         polygon = vertices[list(face)]
         n, origin = face_plane(polygon)
-        inside = (np.abs((x - origin) @ n).max(axis=1) < near) & (normal @ n > 0.5)
+        inside = (np.abs((x - origin) @ n).max(axis=1) < tolerance) & (normal @ n > 0.5)
         inside[inside], cut = _overlaps(x[inside], polygon, n)
         cut_meshes.append(_face_mesh(mesh, inside, start, cut))
     return cut_meshes

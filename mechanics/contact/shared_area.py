@@ -71,16 +71,16 @@ class Recess:
         at = np.searchsorted(self.pair, pair[shared])
         depth = self.depth.copy()
         depth[at] = np.minimum(depth[at], deepest[shared])
-        left = depth > 0.0
-        return Recess(self.pair[left], depth[left])
+        recessed = depth > 0.0
+        return Recess(self.pair[recessed], depth[recessed])
 
     def acting(self, contacts: Contacts, state: State, reach: Array) -> Ints:
         """Return the contacts (n,) that have no recess, or that come near it in a step with the `reach` (nb,) [m]."""
         recess = self.of(contacts)
         if not recess.any():
             return np.arange(len(contacts))
-        near = gaps(contacts, state) <= reach[contacts.bodies].sum(axis=1) - _WATCHED * recess
-        return np.flatnonzero(near | (recess == 0.0))
+        approaching = gaps(contacts, state) <= reach[contacts.bodies].sum(axis=1) - _WATCHED * recess
+        return np.flatnonzero(approaching | (recess == 0.0))
 
 
 def recess_at(find: Detector, state: State) -> Recess:

@@ -95,8 +95,8 @@ def surfaces(
         first_vertex, first_face = vptr[rows][:, None], fptr[rows][:, None]
         place = vertex[first_vertex + np.arange(len(vertices[rows[0]]))]
         normals, areas = face_planes_alike(place, group)
-        own = first_face + np.arange(len(group))
-        normal[own], face_area[own] = normals, areas
+        numbers = first_face + np.arange(len(group))
+        normal[numbers], face_area[numbers] = normals, areas
         loops = np.concatenate([np.asarray(face) for face in group])
         corner[cptr[first_face] + np.arange(len(loops))] = first_vertex + loops
         size[rows] = smallest_widths(place, normals)
@@ -171,7 +171,7 @@ def _edges(faces: tuple[tuple[int, ...], ...], vertex: Array, normal: Array) -> 
     face_of = {
         (a, b): n for n, face in enumerate(faces) for a, b in zip(face, (*face[1:], face[0]), strict=True)
     }
-    sides = [(a, b, one, face_of[b, a]) for (a, b), one in sorted(face_of.items()) if a < b]
+    sides = [(a, b, face, face_of[b, a]) for (a, b), face in sorted(face_of.items()) if a < b]
     a, b, first, second = np.array(sides, dtype=np.int64).T
     turned = np.cross(normal[:, second], normal[:, first])
     forward = np.einsum("nei,nei->ne", vertex[:, b] - vertex[:, a], turned) >= 0

@@ -185,10 +185,10 @@ def _compliance_block(touched: _Touched, turn: Array, compliance: Compliance, fi
     """
     nodes, column = np.unique(touched.node, return_inverse=True)
     # stones have few other nodes: dense products are faster than sparse ones
-    own = np.zeros((len(turn), len(nodes)))
-    own[np.repeat(np.arange(len(turn)), touched.number), column] = touched.weight
-    half = _condensed(own, turn, compliance.between(nodes - first))
-    block = _condensed(own, turn, np.ascontiguousarray(half.T))
+    weight = np.zeros((len(turn), len(nodes)))
+    weight[np.repeat(np.arange(len(turn)), touched.number), column] = touched.weight
+    half = _condensed(weight, turn, compliance.between(nodes - first))
+    block = _condensed(weight, turn, np.ascontiguousarray(half.T))
     symmetric: Array = 0.5 * (block + block.T)
     return symmetric
 

@@ -141,8 +141,8 @@ class BodyForm(SparseForm):
             """Solve for forces, refined where rounding has left a residual."""
             x = quick(b)
             r = x.reshape(theta.shape[:2])
-            left = b - (apply(r, self._contacts) + np.einsum("cij,cj->ci", theta, r)).ravel()
-            if np.linalg.norm(left) <= _LOST * np.linalg.norm(b):
+            remaining = b - (apply(r, self._contacts) + np.einsum("cij,cj->ci", theta, r)).ravel()
+            if np.linalg.norm(remaining) <= _LOST * np.linalg.norm(b):
                 return x
             return super(BodyForm, self).shifted(theta)(b)
 

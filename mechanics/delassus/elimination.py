@@ -44,13 +44,13 @@ def dissection(pairs: Ints, place: Array) -> Ints:
     place : (n, 3) of the bodies, (n, 2) in the plane [m]
     """
     count = len(place)
-    body, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    body, neighbour = np.concatenate([pairs, pairs[:, ::-1]]).T
     start = np.searchsorted(np.sort(body), np.arange(count + 1))
-    near = other[np.argsort(body, kind="stable")]
+    neighbours = neighbour[np.argsort(body, kind="stable")]
     # within a course, sort along the other axes
     axes = np.round(place.T / _COURSE_HEIGHT)
     along = np.array([np.lexsort((*np.delete(axes, k, axis=0), axes[k])) for k in range(len(axes))])
-    rank: Ints = dissect(start, near, along, _LEAF)
+    rank: Ints = dissect(start, neighbours, along, _LEAF)
     return rank
 
 

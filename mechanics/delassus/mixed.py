@@ -87,9 +87,9 @@ class MixedDelassus:
     def form(self) -> CondensedForm | MixedForm:
         """W for methods that factorise."""
         pattern = MixedPattern(self.body, self.kind, self.centre)
-        blocks = [self._signed(own) for own in pattern.elastic]
+        blocks = [self._signed(sides) for sides in pattern.elastic]
         if not len(pattern.moving):
-            cliques = Cliques([own // 2 for own in pattern.elastic], blocks)
+            cliques = Cliques([sides // 2 for sides in pattern.elastic], blocks)
             return CondensedForm(self.body, cliques, self.threads)
         mass = self.mass[pattern.moving]
         return MixedForm(pattern, self.jacobian, mass, blocks, self.threads)

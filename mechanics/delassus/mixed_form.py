@@ -57,12 +57,12 @@ class MixedPattern:
         sides = np.argsort(self.place[self.soft].ravel(), kind="stable")
         ends = np.searchsorted(self.place[self.soft].ravel()[sides], np.arange(moving + 1))
         self.own = [sides[a:b] for a, b in pairwise(ends)]
-        near = [np.concatenate([own // 2, velocities[b]]) for b, own in enumerate(self.own)]
+        coupled = [np.concatenate([slots // 2, velocities[b]]) for b, slots in enumerate(self.own)]
         both = np.sort(self.place[self.hard], axis=1)
         self.pairs, pair = np.unique(both, axis=0, return_inverse=True)
         self.pair = pair.ravel()
         joints = [velocities[pair[pair >= 0]].ravel() for pair in self.pairs]
-        self.unknowns = (*(among[own // 2] for own in self.elastic), *near, *joints)
+        self.unknowns = (*(among[slots // 2] for slots in self.elastic), *coupled, *joints)
         joined, group = np.unique(np.sort(bodies[self.soft], axis=1), axis=0, return_inverse=True)
         rigid = np.repeat(np.arange(moving) + len(joined), 2)
         self._group = np.concatenate([group.ravel(), rigid])
@@ -77,7 +77,9 @@ class MixedPattern:
 def mixed_fronts(bodies: Ints, kind: Ints, centre: Array) -> Fronts:
     """Return the fronts of W + Θ; the same parameters as for `MixedPattern`."""
     pattern = MixedPattern(bodies, kind, centre)
-    return pattern.fronts if len(pattern.moving) else fronts(bodies, [own // 2 for own in pattern.elastic])
+    return (
+        pattern.fronts if len(pattern.moving) else fronts(bodies, [sides // 2 for sides in pattern.elastic])
+    )
 
 
 def _by_body(body: Ints, sides: Ints) -> list[Ints]:
@@ -113,7 +115,7 @@ class MixedForm:
         self._pattern, self._mass, self._threads = pattern, mass, threads
         sign = np.array([1.0, -1.0])[:, None, None]
         self._jacobian = np.where(pattern.place[..., None, None] >= 0, sign * jacobian, 0.0)
-        self._elastic = Cliques([own // 2 for own in pattern.elastic], blocks)
+        self._elastic = Cliques([sides // 2 for sides in pattern.elastic], blocks)
 
     @cached_property
     def _across(self) -> "csr_array[np.float64]":
@@ -179,8 +181,10 @@ class MixedForm:
         stiff = across.transpose(0, 2, 1) @ (inverse @ across)
         order = np.argsort(pattern.pair, kind="stable")
         first = np.searchsorted(pattern.pair[order], np.arange(len(pattern.pairs)))
-        for block, kept in zip(np.add.reduceat(stiff[order], first, axis=0), pattern.pairs >= 0, strict=True):
-            axes = np.repeat(kept, 6)
+        for block, moving in zip(
+            np.add.reduceat(stiff[order], first, axis=0), pattern.pairs >= 0, strict=True
+        ):
+            axes = np.repeat(moving, 6)
             yield -np.ascontiguousarray(block[axes][:, axes].T)
 
 
@@ -214,17 +218,17 @@ class _Factors:
         load = second + self.across.T @ pushed.ravel()
         x = self.factors.solve(np.concatenate([wanted[soft].ravel(), load]))
         v = -x[3 * len(soft) :]
-        r, left = np.empty_like(wanted), wanted - (self.across @ v).reshape(-1, 3)
+        r, remaining = np.empty_like(wanted), wanted - (self.across @ v).reshape(-1, 3)
         r[soft] = x[: 3 * len(soft)].reshape(-1, 3)
-        r[hard] = _product(self.inverse, left[hard])
+        r[hard] = _product(self.inverse, remaining[hard])
         return r.ravel(), v
 
     def refined(self, b: Array) -> Array:
         """Return (W + Θ)⁻¹ b (3 nc,)."""
         r, v = self.once(b, np.zeros(self.across.shape[1]))
         for _ in range(_REFINEMENTS):
-            own = _product(self.theta, r.reshape(-1, 3)).ravel() + self._yielded(r)
-            first = b - own - self.across @ v
+            product = _product(self.theta, r.reshape(-1, 3)).ravel() + self._yielded(r)
+            first = b - product - self.across @ v
             second = self.across.T @ r - _product(self.mass, v.reshape(-1, 6)).ravel()
             change, step = self.once(first, second)
             r += change

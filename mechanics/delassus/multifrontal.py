@@ -117,9 +117,9 @@ class _Elimination:
         self.factor = np.zeros(fronts.size)
         self.pivots = np.empty(int(fronts.layout.pptr[-1]), dtype=np.int32)
 
-    def eliminate_all(self, own: list[int]) -> None:
+    def eliminate_all(self, chosen: list[int]) -> None:
         """Eliminate fronts one after the other."""
-        for f in own:
+        for f in chosen:
             self.eliminate(f, map)
 
     def eliminate(self, f: int, each: Callable[..., Iterable[None]]) -> None:
@@ -277,11 +277,11 @@ def _merged(order: Ints, later: list[list[int]], size: Ints) -> tuple[Ints, list
             children[f].remove(child)
         if later[f]:
             children[later[f][0]].append(f)
-    kept = list(pivots)
+    roots = list(pivots)
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
-    groups = [sorted(pivots[f], key=rank.__getitem__) for f in kept]
-    return np.arange(len(kept)), groups, [later[f] for f in kept]
+    groups = [sorted(pivots[f], key=rank.__getitem__) for f in roots]
+    return np.arange(len(roots)), groups, [later[f] for f in roots]
 
 
 def _unknowns(members: Sequence[Ints]) -> Ints:
@@ -325,12 +325,12 @@ def _left_in_fronts(pairs: Ints, rank: Ints) -> list[list[int]]:
     """Return the groups left in each front, in order; `pairs` (m, 2) are coupled groups, `rank` (n,) orders them."""
     order = np.argsort(rank)
     first = np.where(rank[pairs[:, 0]] < rank[pairs[:, 1]], 0, 1)
-    left: list[set[int]] = [set() for _ in rank]
+    remaining: list[set[int]] = [set() for _ in rank]
     each = np.arange(len(pairs))
     for g, h in zip(pairs[each, first].tolist(), rank[pairs[each, 1 - first]].tolist(), strict=True):
-        left[g].add(h)
+        remaining[g].add(h)
     for g in order.tolist():
-        if left[g]:
-            least = min(left[g])
-            left[int(order[least])] |= left[g] - {least}
-    return [order[sorted(ranks)].tolist() if ranks else [] for ranks in left]
+        if remaining[g]:
+            least = min(remaining[g])
+            remaining[int(order[least])] |= remaining[g] - {least}
+    return [order[sorted(ranks)].tolist() if ranks else [] for ranks in remaining]

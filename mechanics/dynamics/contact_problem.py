@@ -168,9 +168,9 @@ def contact_problem(
         elastic = model.elastic[contacts.bodies].any(axis=1)
         # a ball dents a meshed face by what the mesh does not see of it
         round_ = model.surfaces.radius[model.surfaces.sptr[:-1]][contacts.bodies].any(axis=1)
-        kept = meets & (np.abs(closed) > _TOUCH * size) & ~(round_ & elastic)
+        closes = meets & (np.abs(closed) > _TOUCH * size) & ~(round_ & elastic)
         internal = internal.copy()
-        internal[:, REST] = np.where(kept, closed, internal[:, REST])
+        internal[:, REST] = np.where(closes, closed, internal[:, REST])
     else:
         meets = np.zeros(len(gap), dtype=bool)
     sprung = model.laws.sprung
@@ -210,7 +210,7 @@ def contact_problem(
     if open_.any():
         never = _NEVER * (float(np.abs(u_free).max()) + 1e-300)
         terms = replace(terms, bias=np.where(open_, never, terms.bias))
-    if max(float(np.abs(one).max(initial=0.0)) for one in (u_free, terms.bias)) < SMALLEST:
+    if max(float(np.abs(velocity).max(initial=0.0)) for velocity in (u_free, terms.bias)) < SMALLEST:
         # a motion that has died out is too slow for its squares to be numbers
         u_free, terms = np.zeros_like(u_free), replace(terms, bias=np.zeros_like(terms.bias))
     problem = ContactProblem(operator, u_free, terms.bias, terms.friction, terms.cohesion, terms.adhesion)
@@ -238,8 +238,8 @@ def _thickness(model: Model, detection: Detection) -> Array | None:
             where=model.scene.name,
             remedy="give thickness beside mortar_young in the law of this joint, for pairs of which none is known",
         )
-    known: Array = np.where(np.isnan(thickness), 0.0, thickness)
-    return known
+    filled: Array = np.where(np.isnan(thickness), 0.0, thickness)
+    return filled
 
 
 def spring_axes(contacts: Contacts, state: State) -> Array:
@@ -248,8 +248,8 @@ def spring_axes(contacts: Contacts, state: State) -> Array:
     Which of two faces carries the frame of a joint changes as stones turn by a millionth, and with it the candidate.
     Its springs are kept as the displacement of the body of the lower number over the other, in its axes.
     """
-    own = np.where(contacts.bodies[:, 0] < contacts.bodies[:, 1], 1.0, -1.0)
-    axes: Array = own[:, None, None] * (contacts.frame @ state.rotation[contacts.bodies.min(axis=1)])
+    sign = np.where(contacts.bodies[:, 0] < contacts.bodies[:, 1], 1.0, -1.0)
+    axes: Array = sign[:, None, None] * (contacts.frame @ state.rotation[contacts.bodies.min(axis=1)])
     return axes
 
 

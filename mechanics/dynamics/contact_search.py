@@ -171,14 +171,14 @@ class ContactSearch:
             copied._last = replace(self._last, model=model) if compliance is self._compliance else None
         return copied
 
-    def follow(self, other: "ContactSearch", model: Model) -> None:
+    def follow(self, earlier: "ContactSearch", model: Model) -> None:
         """Know the last result of another search of the same rigid bodies, with steps as long.
 
         Slivers of contacts may be found or not after movements of rounding alone, and with them their forces are lost.
         """
-        self.recess = other.recess
-        if other._last is not None:
-            self._last = replace(other._last, model=model)
+        self.recess = earlier.recess
+        if earlier._last is not None:
+            self._last = replace(earlier._last, model=model)
 
     def _is_stale(self, last: Detection, model: Model, predicted: State) -> bool:
         if self._every_step or last.model is not model:

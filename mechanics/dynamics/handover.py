@@ -133,7 +133,7 @@ def _renamed(key: Ints, before: Model, after: Model, new: Ints) -> Ints:
     """Return the keys (nc,) of contacts in the next model, given the new numbers of bodies; -1: not there any more."""
     count, low = len(before.surfaces.body), key & _LOW
     pair = key >> PAIR_BIT
-    first, second = (_shape(one, before, after, new) for one in (pair // count, pair % count))
+    first, second = (_shape(shape, before, after, new) for shape in (pair // count, pair % count))
     body, node = _node(np.where(low & NODE, low & (NODE - 1), 0), before, after, new)
     named = np.where(low & NODE, NODE + node, low)
     gone = (first < 0) | (second < 0) | ((low & NODE > 0) & (body < 0))
@@ -145,10 +145,10 @@ def _shape(shape: Ints, before: Model, after: Model, new: Ints) -> Ints:
     """Return the new numbers of shapes; -1 for those of bodies that are gone."""
     surfaces_before, surfaces_after = before.surfaces, after.surfaces
     body = new[surfaces_before.body[shape]]
-    found: Ints = np.where(
+    numbers: Ints = np.where(
         body < 0, -1, surfaces_after.sptr[body] + shape - surfaces_before.sptr[surfaces_before.body[shape]]
     )
-    return found
+    return numbers
 
 
 def _node(node: Ints, before: Model, after: Model, new: Ints) -> tuple[Ints, Ints]:

@@ -107,24 +107,24 @@ class Simulation(Carrier):
         """Bring all bodies to a halt, and set the clock of the scene to `time` [s]."""
         self.state = replace(halted(self.state), time=time)
 
-    def take_over(self, other: "Simulation") -> None:
+    def take_over(self, earlier: "Simulation") -> None:
         """Continue where another run of the same bodies came to rest, with its forces and internal variables.
 
         The bodies have the velocities with which this run begins.
         """
         state = self.state
         self.state = replace(
-            other.state, time=state.time, velocity=state.velocity, node_velocity=state.node_velocity
+            earlier.state, time=state.time, velocity=state.velocity, node_velocity=state.node_velocity
         )
-        pace = self._step / other._step
-        self._memory = other._memory.at_rest(pace)
+        pace = self._step / earlier._step
+        self._memory = earlier._memory.at_rest(pace)
         self._memory.follows = not self.model.scene.time.relaxation
         # stiffness 1/(ε h²) stays
-        self._joints = replace(other._joints, value=other._joints.value / pace**2)
+        self._joints = replace(earlier._joints, value=earlier._joints.value / pace**2)
         if pace == 1.0 and self.model.rigid_only:
-            self._detect.follow(other._detect, self.model)
+            self._detect.follow(earlier._detect, self.model)
         else:
-            self._detect.recess = other._detect.recess
+            self._detect.recess = earlier._detect.recess
         self._sleepers = Sleepers(self.model, self.state, self._memory)
         self._first = False
 
@@ -183,8 +183,8 @@ class Simulation(Carrier):
         _, internal = self._memory.recall(detection.contacts.key, detection.place)
         free = free_kick(model, self.start, predicted, self._compliance, h, self._theta)
         problem, approach = contact_problem(model, predicted, detection, free, internal, None)
-        near = problem.bias <= CLOSED_BIAS * float(np.abs(problem.u_free).max())
-        problem = replace(problem, bias=np.where(near, 0.0, problem.bias))
+        closed = problem.bias <= CLOSED_BIAS * float(np.abs(problem.u_free).max())
+        problem = replace(problem, bias=np.where(closed, 0.0, problem.bias))
         rests, impulse = rests_from_nothing(problem)
         if not rests:
             begin = ContactSolution(unshifted(problem, impulse), np.zeros_like(impulse), 0, np.inf, False)
@@ -199,7 +199,7 @@ class Simulation(Carrier):
         """
         return super().carried() | {
             "detected": self._detect.configuration(self._sleepers.model),
-            "condensed": tuple(one.condensed for one in self._compliance),
+            "condensed": tuple(compliance.condensed for compliance in self._compliance),
             "recess": self._detect.recess,
         }
 
@@ -238,8 +238,8 @@ class Simulation(Carrier):
             with clock("assemble"):
                 warm, internal = self._memory.recall(detection.contacts.key, detection.place)
                 free = sleepers.hold(free_kick(model, start, predicted, self._compliance, h, theta))
-            given = predicted, detection, free, internal, self._begin if self._first else None
-            problem, approach, solution = self._solved(given, warm)
+            inputs = predicted, detection, free, internal, self._begin if self._first else None
+            problem, approach, solution = self._solved(inputs, warm)
             with clock("advance"):
                 r = unshifted(problem, solution.impulse)
                 kick = kicked(model, free, detection, r, self._compliance)
@@ -280,7 +280,7 @@ class Simulation(Carrier):
 
         Which joints crush is known once it is solved; then it is solved again with these, until they stay the same.
         """
-        found, laws, crushing = inputs[1], self.model.laws, None
+        detection, laws, crushing = inputs[1], self.model.laws, None
         for _ in range(_CRUSHING):
             with self.clock("assemble"):
                 problem, approach = contact_problem(self.model, *inputs, joints, warm.impulse, crushing)
@@ -288,7 +288,7 @@ class Simulation(Carrier):
                 solution = self._solve(problem, shifted(problem, begin))
             if approach.crushing is None:
                 break
-            crushing = laws.crushing(found.law, approach, solution.impulse)
+            crushing = laws.crushing(detection.law, approach, solution.impulse)
             if np.array_equal(crushing, approach.crushing):
                 break
             begin = ContactStart(unshifted(problem, solution.impulse), solution.velocity)

@@ -21,7 +21,7 @@ __all__ = ["static_start"]
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Attempt:
     """Steps of a search.
 
     Attributes
@@ -42,14 +42,14 @@ class _Way:
 
 
 # deformable stones: inertia leaves a structure of 1 Hz less than 1/40 of its motion in a step of 1 s
-_DEFORMING = _Way(1.0, 10, np.inf, tightened=True)
+_DEFORMING = _Attempt(1.0, 10, np.inf, tightened=True)
 # joints that yield between rigid stones: in longer steps those that slide do so too far before they are seen again
-_YIELDING = _Way(0.1, 40, np.inf, tightened=True)
+_YIELDING = _Attempt(0.1, 40, np.inf, tightened=True)
 # deformable stones among more rigid ones: in steps of 1 s a stone would yield by a hundred millionth of what it moves
 # as a whole. Stones that have a way to go, as open joints do not bear them yet, go on until they have passed a peak
-_AMONG_RIGID = _Way(5e-3, 50, 0.5, unsolved=2)
+_AMONG_RIGID = _Attempt(5e-3, 50, 0.5, unsolved=2)
 # rigid stones, which fall by a millimetre in a step; joints that are open by a millimetre need some ten
-_SETTLING = _Way(1e-2, 50)
+_SETTLING = _Attempt(1e-2, 50)
 # tolerances of statics over those asked for, of η and of velocities [-]: Newton's last steps spare the run its first
 _NATURAL_MAP, _VELOCITY = 0.5, 0.01
 _MIN_RESIDUAL = 1e-7  # least η in steps as long as 1 s, because of rounding [-]
@@ -70,8 +70,8 @@ def static_start(
     or warped, they settle in a relaxation.
     """
     begin, count, iterations = halted(start), 0, 0
-    for way in _ways(model):
-        search = _Search(model, begin, report, way, count, iterations)
+    for attempt in _attempts(model):
+        search = _Search(model, begin, report, attempt, count, iterations)
         search.run()
         if search.found:
             break
@@ -79,14 +79,14 @@ def static_start(
     return search.told, search.ended()
 
 
-def _ways(model: Model) -> Iterator[_Way]:
+def _attempts(model: Model) -> Iterator[_Attempt]:
     """Yield the ways to search, each for where the one before has failed."""
     step = model.scene.time.step
     if model.rigid_only:
         if model.laws.sprung:
             yield _YIELDING
             return
-        yield _Way(step, 1)
+        yield _Attempt(step, 1)
         yield replace(_SETTLING, step=max(step, _SETTLING.step))
         return
     if model.mostly_rigid:
@@ -108,11 +108,11 @@ class _Search:
         model: Model,
         start: State,
         report: Callable[[Progress], None],
-        attempt: _Way,
+        attempt: _Attempt,
         count: int,
         iterations: int,
     ) -> None:
-        self._model, self._start, self._report, self._way = model, start, report, attempt
+        self._model, self._start, self._report, self._attempt = model, start, report, attempt
         self.count, self.iterations, self.found = count, iterations, False
         self._balance: Array = np.full(1, np.inf)
         self._eta, self._first = 0.0, count
@@ -125,10 +125,10 @@ class _Search:
     @property
     def _long(self) -> bool:
         """True where W is measured against its elastic part: whole stones move far more in such steps."""
-        return self._way.tightened and not self._model.rigid_only
+        return self._attempt.tightened and not self._model.rigid_only
 
     def _settings(self, asked: SolverSettings) -> SolverSettings:
-        if self._way.tightened:
+        if self._attempt.tightened:
             limits = _NATURAL_MAP * self._goal, _VELOCITY * asked.velocity_tolerance
             return replace(
                 asked,
@@ -145,7 +145,7 @@ class _Search:
 
     def run(self) -> None:
         """Take steps until an equilibrium is found, stones fall, or the way ends."""
-        attempt, unsolved, before = self._way, 0, np.inf
+        attempt, unsolved, before = self._attempt, 0, np.inf
         while self.count - self._first < attempt.most and not self.found and self._settles():
             # the loads stay those of the first instant
             self._search.state = replace(self._search.state, time=self._start.time)
@@ -164,11 +164,11 @@ class _Search:
         step, still = self._model.scene.time.step, self._model.inertia.moving.any()
         if not self.found:
             return self._search
-        if self._way == _Way(step, 1):
+        if self._attempt == _Attempt(step, 1):
             # the very step with which a run from rest begins
             return self._search
         self._search.halt(self._start.time)
-        if not still or (self._way == _AMONG_RIGID and step == self._way.step):
+        if not still or (self._attempt == _AMONG_RIGID and step == self._attempt.step):
             return self._search
         last = Simulation(_still(self._model, step, self._model.scene.solver), self._search.start)
         last.take_over(self._search)
@@ -191,7 +191,7 @@ class _Search:
         self.count, self.iterations = self.count + 1, self.iterations + made.solution.iterations
         self._eta = made.solution.natural_map
         text = f"balance {self._largest:.1e}, η {self._eta:.1e}"
-        self._report(Progress("static", self.count, self._first + self._way.most, text))
+        self._report(Progress("static", self.count, self._first + self._attempt.most, text))
         return made
 
     @property
@@ -199,7 +199,7 @@ class _Search:
         return float(self._balance.max())
 
     def _at_rest(self, made: Step) -> bool:
-        if self._way.tightened:
+        if self._attempt.tightened:
             return self._eta <= self._goal and self._largest <= self._model.scene.time.balance_tolerance
         return made.solution.converged and rests(self._model, made.after, self._balance)
 
@@ -211,6 +211,6 @@ class _Search:
 
 def _still(model: Model, step: float, solver: SolverSettings) -> Model:
     """Return the model for steps of the search: θ = 1, and supports at rest."""
-    own = model.scene.time
-    time = TimeSettings(step=step, theta=1.0, relaxation=True, lumped_mass=own.lumped_mass)
+    settings = model.scene.time
+    time = TimeSettings(step=step, theta=1.0, relaxation=True, lumped_mass=settings.lumped_mass)
     return replace(model, scene=replace(model.scene, time=time, solver=solver), motions=())

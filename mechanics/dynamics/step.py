@@ -51,15 +51,15 @@ class ContactForces:
         terms = Terms(bias, friction, cohesion, adhesion)
         return ContactForces(take(self.contacts, rows), terms, *(values[rows] for values in _arrays(self)))
 
-    def joined(self, other: "ContactForces") -> "ContactForces":
+    def joined(self, following: "ContactForces") -> "ContactForces":
         """Return these followed by others."""
         bias, friction, cohesion, adhesion = map(
-            np.concatenate, zip(_arrays(self.terms), _arrays(other.terms), strict=True)
+            np.concatenate, zip(_arrays(self.terms), _arrays(following.terms), strict=True)
         )
         return ContactForces(
-            joined([self.contacts, other.contacts]),
+            joined([self.contacts, following.contacts]),
             Terms(bias, friction, cohesion, adhesion),
-            *map(np.concatenate, zip(_arrays(self), _arrays(other), strict=True)),
+            *map(np.concatenate, zip(_arrays(self), _arrays(following), strict=True)),
         )
 
 

@@ -159,9 +159,11 @@ def kicked(
         world = world_impulse(detection.contacts, impulse)
         nodal = detection.contacts.weights.T @ np.stack([world, -world], axis=1).reshape(-1, 3)
         node_velocity = node_velocity.copy()
-        for group, own in zip(model.elastic_stones.groups, compliance, strict=True):
+        for group, response in zip(model.elastic_stones.groups, compliance, strict=True):
             turn = detection.configuration.rotation[group.bodies]
-            node_velocity[group.nodes] += own.respond(nodal[group.nodes] @ turn) @ turn.transpose(0, 2, 1)
+            node_velocity[group.nodes] += response.respond(nodal[group.nodes] @ turn) @ turn.transpose(
+                0, 2, 1
+            )
     return Kick(velocity, node_velocity, free.load)
 
 

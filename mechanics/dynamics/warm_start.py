@@ -115,8 +115,8 @@ class Memory(Carrier):
         pair, first = np.unique(self._key[order] >> PAIR_BIT, return_index=True)
         total = np.add.reduceat(stored, first)
         now, row, count = np.unique(key >> PAIR_BIT, return_inverse=True, return_counts=True)
-        at, known = _places(pair, now, np.arange(len(pair)))
-        values[:, column] = (np.where(known, total[at], 0.0) / count)[row]
+        at, paired = _places(pair, now, np.arange(len(pair)))
+        values[:, column] = (np.where(paired, total[at], 0.0) / count)[row]
 
     def store(self, key: Ints, solution: ContactSolution, state: Array, place: Array | None = None) -> None:
         """Remember a step: its solution, with true impulses r, internal variables (nc, STATE) and places."""

@@ -107,16 +107,16 @@ class RigidAssembly:
         ------
         SceneError : there is no such stone
         """
-        known = {block.code: body for body, block in enumerate(self.model.scene.blocks)}
+        body_of = {block.code: body for body, block in enumerate(self.model.scene.blocks)}
         for code in codes:
-            if code not in known:
-                near = get_close_matches(code, known, n=3, cutoff=0.4) or sorted(known)[:3]
+            if code not in body_of:
+                similar = get_close_matches(code, body_of, n=3, cutoff=0.4) or sorted(body_of)[:3]
                 raise SceneError(
                     f"no such stone: {code!r}",
                     where=where,
-                    remedy=f"give the codes of stones of the scene, as {', '.join(near)}",
+                    remedy=f"give the codes of stones of the scene, as {', '.join(similar)}",
                 )
-        return np.array(sorted(known[code] for code in codes), dtype=np.int64)
+        return np.array(sorted(body_of[code] for code in codes), dtype=np.int64)
 
 
 def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
@@ -143,21 +143,21 @@ def assembly(scene: Scene, widest: float = CLOSED) -> RigidAssembly:
             where=scene.name,
             remedy=f"close the joints: gaps up to {widest:g} of a stone's width count as closed",
         )
-    found = detection(model, state, take(contacts, closed), ())
-    assert isinstance(found.operator, RigidDelassus)
-    form = found.operator.form
+    detected = detection(model, state, take(contacts, closed), ())
+    assert isinstance(detected.operator, RigidDelassus)
+    form = detected.operator.form
     assert isinstance(form, SparseForm)
-    joints = find_joints(model, state, found.contacts)
+    joints = find_joints(model, state, detected.contacts)
     crushes = [block.material.compressive_strength for block in scene.blocks]
     return RigidAssembly(
         model=model,
         state=state,
-        contacts=found.contacts,
+        contacts=detected.contacts,
         free=free,
-        operator=found.operator,
+        operator=detected.operator,
         lift=form.lift,
         dead=_dead(model, state, free),
-        strength=joint_strength(model, found.contacts, model.laws),
+        strength=joint_strength(model, detected.contacts, model.laws),
         joints=joints,
         crushing=stress_blocks(joints, np.array([np.inf if crush is None else crush for crush in crushes])),
         widest=float(gap[closed].max()),

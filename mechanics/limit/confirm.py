@@ -77,7 +77,7 @@ class Confirmation:
     def collapse(self) -> ConfirmationRun | None:
         """Run of the least load that collapses; None where none does."""
         fallen = [trial for trial in self.trials if trial.outcome is Outcome.COLLAPSED]
-        return min(fallen, key=lambda one: one.multiplier, default=None)
+        return min(fallen, key=lambda run: run.multiplier, default=None)
 
     def agrees(self, candidate: float) -> bool:
         """Return True if the limit of the dynamics lies within 3 % of a candidate."""
@@ -112,12 +112,14 @@ def likeness(on: RigidAssembly, mechanism: Mechanism, displacement: Array) -> Li
     moves = velocity[:, :3] + np.cross(velocity[:, 3:], np.array(corners) - centre)
     falls = displacement[on.free]
     both = float(np.sqrt((mass @ (moves**2).sum(axis=1)) * (mass @ (falls**2).sum(axis=1))))
-    one, other = _belongs(moves), _belongs(falls)
+    in_mechanism, in_collapse = _belongs(moves), _belongs(falls)
     return Likeness(
         cosine=float(mass @ (moves * falls).sum(axis=1)) / (both or 1.0),
-        mechanism=float(mass[one].sum() / mass.sum()),
-        collapse=float(mass[other].sum() / mass.sum()),
-        common=float(mass[one & other].sum() / (mass[one | other].sum() or 1.0)),
+        mechanism=float(mass[in_mechanism].sum() / mass.sum()),
+        collapse=float(mass[in_collapse].sum() / mass.sum()),
+        common=float(
+            mass[in_mechanism & in_collapse].sum() / (mass[in_mechanism | in_collapse].sum() or 1.0)
+        ),
     )
 
 
@@ -151,27 +153,27 @@ def confirm(
     SceneError, SolverError : see `simulate`
     """
     trials: list[ConfirmationRun] = []
-    held, lost, way = 0.0, bound, _LOAD_ACCURACY
+    carried, lost, step = 0.0, bound, _LOAD_ACCURACY
     multiplier = min(candidate, bound)
-    while len(trials) < runs and not stop() and lost > (1.0 + _LOAD_ACCURACY) * held:
+    while len(trials) < runs and not stop() and lost > (1.0 + _LOAD_ACCURACY) * carried:
         trial = _trial(on, live, multiplier, progress, stop)
         trials.append(trial)
         if trial.outcome.rests:
-            held = multiplier
+            carried = multiplier
         else:
             lost = multiplier
-        if held == 0.0:
-            multiplier, way = multiplier * max(1.0 - way, 0.5), 2.0 * way
+        if carried == 0.0:
+            multiplier, step = multiplier * max(1.0 - step, 0.5), 2.0 * step
         elif np.isinf(lost):
-            multiplier, way = multiplier * (1.0 + way), 2.0 * way
+            multiplier, step = multiplier * (1.0 + step), 2.0 * step
         else:
             # next to the candidate first, half-way later on
-            multiplier = min(0.5 * (held + lost), held * (1.0 + way))
-            way *= 2.0
+            multiplier = min(0.5 * (carried + lost), carried * (1.0 + step))
+            step *= 2.0
     if np.isfinite(lost) and all(trial.outcome.rests for trial in trials) and not stop():
         # how stones fall beyond the bound
         trials.append(_trial(on, live, (1.0 + _LOAD_ACCURACY) * lost, progress, stop))
-    return Confirmation(held, float(lost), tuple(trials))
+    return Confirmation(carried, float(lost), tuple(trials))
 
 
 def _trial(

@@ -129,8 +129,8 @@ def _balances(on: RigidAssembly) -> bool:
     """Return whether some forces within the strength of the joints balance the dead load."""
     least = np.zeros((len(on.contacts), 3))
     least[:, 0] = 1.0 / len(least)
-    found = Programme(on, None, on.model.scene.name).solve(on.strength, cost=least)
-    return found.ending is Ending.FOUND
+    optimum = Programme(on, None, on.model.scene.name).solve(on.strength, cost=least)
+    return optimum.ending is Ending.FOUND
 
 
 def stands(
@@ -145,20 +145,20 @@ def stands(
     share = np.where(on.model.fixed, 0.0, farthest / on.model.surfaces.size)
     order = np.argsort(-share, kind="stable")
     moved = tuple(scene.blocks[body].code for body in order if share[body] > MOVED)
-    found = Standing(
+    standing = Standing(
         result.outcome, result.reason, moved, displacement, farthest=float(farthest.max(initial=0.0))
     )
     if not result.outcome.rests:
-        return found
+        return standing
     broken = _broken(on, result)
     # springs settle under the weight anew in each run, so that their joints stay where they are drawn
     leaves = bool(share.max(initial=0.0) > CLOSED) and not on.model.laws.sprung
     if not broken and not leaves:
-        return found
+        return standing
     drawn = set(map(tuple, np.sort(on.contacts.bodies, axis=1).tolist()))
     codes = tuple((scene.blocks[a].code, scene.blocks[b].code) for a, b in broken if (a, b) in drawn)
     falls = leaves and not _balances(on)
-    return replace(found, rest=_at_rest(on, result, broken, leaves), broken=codes, falls_as_drawn=falls)
+    return replace(standing, rest=_at_rest(on, result, broken, leaves), broken=codes, falls_as_drawn=falls)
 
 
 def _at_rest(
@@ -200,9 +200,9 @@ def _moved(block: Block, before: Array, after: Array) -> Block:
     if np.array_equal(before, after):
         return block
     middle, now = before.mean(axis=0), after.mean(axis=0)
-    left, _, right = np.linalg.svd((after - now).T @ (before - middle))
-    turn = left @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(left @ right)))]) @ right
-    parts = tuple(Part((one.vertices - middle) @ turn.T + now, one.faces) for one in block.parts)
+    u, _, vt = np.linalg.svd((after - now).T @ (before - middle))
+    turn = u @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(u @ vt)))]) @ vt
+    parts = tuple(Part((piece.vertices - middle) @ turn.T + now, piece.faces) for piece in block.parts)
     return replace(block, vertices=(block.vertices - middle) @ turn.T + now, parts=parts)
 
 
@@ -215,6 +215,6 @@ def _broken(on: RigidAssembly, result: Result) -> dict[tuple[int, int], bool]:
     meant = laws.makes_bonds(laws.of(contacts.bodies)) & (contacts.area > 0)
     pairs = np.sort(contacts.bodies[meant], axis=1).tolist()
     status = contacts.status[meant].tolist()
-    lost = {(a, b) for (a, b), one in zip(pairs, status, strict=True) if one not in _HOLDS}
-    touching = {(a, b) for (a, b), one in zip(pairs, status, strict=True) if one not in _PARTED}
+    lost = {(a, b) for (a, b), state in zip(pairs, status, strict=True) if state not in _HOLDS}
+    touching = {(a, b) for (a, b), state in zip(pairs, status, strict=True) if state not in _PARTED}
     return {pair: pair not in touching for pair in sorted(lost)}

@@ -126,36 +126,36 @@ def held_limit(
     if candidate is not None and candidate < (1.0 - _BESIDE) * bound.multiplier:
         # in whole hundredths of the bound, as forms of a scene agree on a candidate to 0.2 %
         first = int(_BESIDE * int(candidate / (_BESIDE * bound.multiplier)) * high)
-    found = _lasting(on, steps, search, search.limit(on, 0, high, first))
-    return found if found.mechanism is not None else replace(found, lost=bound.multiplier)
+    limit = _lasting(on, steps, search, search.limit(on, 0, high, first))
+    return limit if limit.mechanism is not None else replace(limit, lost=bound.multiplier)
 
 
 def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldLimit:
     """Return the limit below the first load that falls, doubled again and again; an endless one if none does."""
-    held, best, load, problems = 0.0, nothing, _FIRST, 1
+    carried, best, load, problems = 0.0, nothing, _FIRST, 1
     while load * WIDTH <= _FIRST:
         trial = steps(load)
         problems += 1
         if not trial.holds:
             unit = _unit(load)
-            low, high = round(held / unit), round(load / unit)
+            low, high = round(carried / unit), round(load / unit)
             tried = {0: nothing, low: best, high: trial}
             search = _Search(steps, unit, tried)
-            found = _lasting(on, steps, search, search.limit(on, low, high, None))
-            return replace(found, problems=problems + found.problems - len(tried))
-        held, best, load = load, trial, 2.0 * load
+            limit = _lasting(on, steps, search, search.limit(on, low, high, None))
+            return replace(limit, problems=problems + limit.problems - len(tried))
+        carried, best, load = load, trial, 2.0 * load
     return HeldLimit(np.inf, np.inf, best.force, None, problems)
 
 
-def _lasting(on: RigidAssembly, steps: "_Steps", search: "_Search", found: HeldLimit) -> HeldLimit:
+def _lasting(on: RigidAssembly, steps: "_Steps", search: "_Search", limit: HeldLimit) -> HeldLimit:
     """Return a limit; where stones surely move after the step that it holds, as steps that are followed give it."""
-    falling = steps.released(found.held) if found.held else None
+    falling = steps.released(limit.held) if limit.held else None
     if falling is None:
-        return found
-    high = round(found.held / search.unit)
+        return limit
+    high = round(limit.held / search.unit)
     tried = {0: search.tried[0], high: falling}
     again = replace(search, steps=steps.followed, tried=tried).limit(on, 0, high, None)
-    return replace(again, problems=found.problems + again.problems)
+    return replace(again, problems=limit.problems + again.problems)
 
 
 def _unit(load: float) -> float:
@@ -285,15 +285,15 @@ class _Steps:
     ) -> _Trial:
         """Return the step that a chain finds from impulses (nc, 3)."""
         on, u_free = self._on, problem.u_free
-        found = follow(chain, problem, ContactStart(impulse, np.zeros_like(impulse)), _LIMITS, _ITERATIONS)
-        force = found.impulse - self._pull
-        fastest = float(np.abs(self._operator.apply(found.impulse) + u_free).max())
+        solution = follow(chain, problem, ContactStart(impulse, np.zeros_like(impulse)), _LIMITS, _ITERATIONS)
+        force = solution.impulse - self._pull
+        fastest = float(np.abs(self._operator.apply(solution.impulse) + u_free).max())
         pace = float(np.abs(u_free).max()) or 1.0
         velocity = (free + self._operator.rigid_change(force))[on.free]
         load = self._dead + multiplier * self._live
         gained = float(velocity.ravel() @ (load + on.lift @ force.ravel()))
         power = float(velocity.ravel() @ self._live)
-        error = residual(problem, found.impulse).velocity * pace / (fastest or 1.0)
+        error = residual(problem, solution.impulse).velocity * pace / (fastest or 1.0)
         return _Trial(
             holds=fastest <= (_CREEPS if error <= _SURE else _MOVES) * pace,
             stops=multiplier - gained / power if power > 0.0 else 0.0,

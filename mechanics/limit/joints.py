@@ -89,22 +89,24 @@ class Resultants:
 def find_joints(model: Model, state: State, contacts: Contacts) -> Joints:
     """Return the joints to which contact points belong."""
     faces = placed_faces(model, state)
-    found = find_interfaces(faces, contacts, state)
+    interfaces = find_interfaces(faces, contacts, state)
     point: Array = material_points(contacts, state).mean(axis=1)
-    return Joints(faces.body[found.face], sections(faces, found.face), found.joint, point)
+    return Joints(faces.body[interfaces.face], sections(faces, interfaces.face), interfaces.joint, point)
 
 
 def resultants(joints: Joints, contacts: Contacts, force: Array, strength: Array) -> Resultants:
     """Return the resultants of forces (nc, 3) in local frames, given the shear strength (nc,) of each contact [N]."""
-    own, count, section = np.flatnonzero(joints.joint >= 0), len(joints.bodies), joints.section
-    joint = joints.joint[own]
-    world = np.einsum("ci,cij->cj", force[own], contacts.frame[own])
-    total, moment = summed(section, joints.bodies, joint, contacts.bodies[own, 0], joints.point[own], world)
+    jointed, count, section = np.flatnonzero(joints.joint >= 0), len(joints.bodies), joints.section
+    joint = joints.joint[jointed]
+    world = np.einsum("ci,cij->cj", force[jointed], contacts.frame[jointed])
+    total, moment = summed(
+        section, joints.bodies, joint, contacts.bodies[jointed, 0], joints.point[jointed], world
+    )
     normal = np.einsum("ji,ji->j", total, section.frame[:, 0])
     shear = np.linalg.norm(total - normal[:, None] * section.frame[:, 0], axis=1)
     least = _FREE * float(np.abs(normal).max(initial=0.0))
     place, kern, edge = eccentricity(section, total, moment, least)
-    most = np.bincount(joint, strength[own], count)
+    most = np.bincount(joint, strength[jointed], count)
     return Resultants(
         force=total,
         normal=normal,

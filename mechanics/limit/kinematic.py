@@ -69,7 +69,7 @@ class Kinematics:
         return self.multiplier * self.weight / (self.mass * confidence)
 
 
-def kinematics(on: RigidAssembly, live: Acceleration, found: LimitLoad) -> Kinematics:
+def kinematics(on: RigidAssembly, live: Acceleration, limit: LimitLoad) -> Kinematics:
     """Return the kinematic analysis of the mechanism of a limit load.
 
     Raises
@@ -78,10 +78,10 @@ def kinematics(on: RigidAssembly, live: Acceleration, found: LimitLoad) -> Kinem
     """
     gravity = on.model.gravity(0.0)
     down, size = gravity / np.linalg.norm(gravity), float(np.linalg.norm(gravity))
-    way = np.asarray(live.direction, dtype=float) / np.linalg.norm(live.direction)
-    block = _blocks(on, found.mechanism)
+    direction = np.asarray(live.direction, dtype=float) / np.linalg.norm(live.direction)
+    block = _blocks(on, limit.mechanism)
     count = int(block.max()) + 1
-    if not count or not np.isfinite(found.multiplier):
+    if not count or not np.isfinite(limit.multiplier):
         raise SolverError(
             "there is no mechanism to follow", where=str(live), remedy="take a load that has one"
         )
@@ -89,16 +89,16 @@ def kinematics(on: RigidAssembly, live: Acceleration, found: LimitLoad) -> Kinem
     weight = np.bincount(block[moving], on.model.mass[moving] * size, count)
     centre, velocity, spin = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
     for number in range(count):
-        own = np.flatnonzero(block == number)
-        centre[number] = on.model.mass[own] @ on.state.centre[own] / on.model.mass[own].sum()
-        first = own[np.argmax(on.model.mass[own])]
-        spin[number] = found.mechanism.velocity[first, 3:]
+        members = np.flatnonzero(block == number)
+        centre[number] = on.model.mass[members] @ on.state.centre[members] / on.model.mass[members].sum()
+        first = members[np.argmax(on.model.mass[members])]
+        spin[number] = limit.mechanism.velocity[first, 3:]
         arm = centre[number] - on.state.centre[first]
-        velocity[number] = found.mechanism.velocity[first, :3] + np.cross(spin[number], arm)
-    along = velocity @ way
+        velocity[number] = limit.mechanism.velocity[first, :3] + np.cross(spin[number], arm)
+    along = velocity @ direction
     if not weight @ along > 0:
         raise SolverError("the mechanism does not move along the load", where=str(live))
-    loss = weight @ (velocity @ down) + found.multiplier * (weight @ along)
+    loss = weight @ (velocity @ down) + limit.multiplier * (weight @ along)
 
     def at(time: float) -> tuple[Array, float]:
         """Return the ways of the blocks along the load, and λ, when they have gone on for a time."""
@@ -110,7 +110,7 @@ def kinematics(on: RigidAssembly, live: Acceleration, found: LimitLoad) -> Kinem
         swept = (
             np.sin(turn) * (velocity - fixed) + (1.0 - np.cos(turn)) * np.cross(axis, velocity)
         ) / turn + fixed
-        return time * swept @ way, float((loss - weight @ (now @ down)) / (weight @ (now @ way)))
+        return time * swept @ direction, float((loss - weight @ (now @ down)) / (weight @ (now @ direction)))
 
     fastest = float(np.linalg.norm(spin, axis=1).max())
     last, ends = _end(lambda time: at(time)[1], fastest)
@@ -120,7 +120,7 @@ def kinematics(on: RigidAssembly, live: Acceleration, found: LimitLoad) -> Kinem
     displacement = np.array([lever @ ways / lever.sum() for ways, _ in curve])
     return Kinematics(
         block=block,
-        multiplier=found.multiplier,
+        multiplier=limit.multiplier,
         weight=float(weight.sum()),
         mass=float((weight @ along) ** 2 / (size * (weight @ along**2))),
         share=float((weight @ along) ** 2 / (weight @ along**2) / weight.sum()),
@@ -152,9 +152,9 @@ def _blocks(on: RigidAssembly, mechanism: Mechanism) -> Ints:
     apart = np.linalg.norm(carried - velocity[b, :3], axis=1)
     size = on.model.surfaces.size[b]
     apart += 0.5 * size * np.linalg.norm(velocity[a, 3:] - velocity[b, 3:], axis=1)
-    one = moves[a] & moves[b] & (apart < _SAME_MOTION)
+    together = moves[a] & moves[b] & (apart < _SAME_MOTION)
     count = len(on.model.mass)
-    graph = coo_array((np.ones(int(one.sum())), (a[one], b[one])), shape=(count, count))
+    graph = coo_array((np.ones(int(together.sum())), (a[together], b[together])), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     block = np.full(count, -1)
     block[moves] = np.unique(label[moves], return_inverse=True)[1]

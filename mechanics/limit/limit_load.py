@@ -131,8 +131,8 @@ class LimitLoad:
         if np.isinf(self.multiplier):
             return f"{self.load}: nothing limits it"
         kind = "rigorous upper bound" if self.flow is Flow.ASSOCIATIVE else "candidate, may fall at less"
-        left = "" if self.converged else "; NOT CONVERGED"
-        return f"{self.load}: λ = {self.multiplier:.4g} ({self.flow} friction, {kind}{left})"
+        caution = "" if self.converged else "; NOT CONVERGED"
+        return f"{self.load}: λ = {self.multiplier:.4g} ({self.flow} friction, {kind}{caution})"
 
 
 def limit_load(
@@ -155,16 +155,16 @@ def limit_load(
 
 def _bound(on: RigidAssembly, programme: Programme, name: str) -> LimitLoad:
     """Return the limit load of associative friction."""
-    found = programme.solve(on.strength)
+    optimum = programme.solve(on.strength)
     return LimitLoad(
         flow=Flow.ASSOCIATIVE,
         load=name,
-        multiplier=found.multiplier,
-        force=found.force,
-        mechanism=mechanism(on, found.velocity),
+        multiplier=optimum.multiplier,
+        force=optimum.force,
+        mechanism=mechanism(on, optimum.velocity),
         programmes=1,
         converged=True,
-        beyond=_beyond(on, found.force),
+        beyond=_beyond(on, optimum.force),
     )
 
 
@@ -187,8 +187,8 @@ def without_friction_across(on: RigidAssembly, live: LiveLoad, candidate: LimitL
     steady = candidate.mechanism.speed <= _STILL
     sliding = candidate.mechanism.sliding.copy()
     for side in (0, 1):
-        body, other = on.contacts.bodies[:, side], on.contacts.bodies[:, 1 - side]
-        here = np.isin(body, wedges) & steady[other]
+        body, neighbour = on.contacts.bodies[:, side], on.contacts.bodies[:, 1 - side]
+        here = np.isin(body, wedges) & steady[neighbour]
         slip[here] = np.einsum("cij,cj->ci", on.contacts.frame[here, 1:], line[body[here]])
         sliding |= here
     slides = np.flatnonzero(sliding & (np.linalg.norm(slip, axis=1) > 0.0))
@@ -224,10 +224,10 @@ def lines_of_sliding(on: RigidAssembly, limit: LimitLoad) -> Array:
         normals = on.contacts.frame[stands & (bodies == body).any(axis=1), 0]
         size, axes = np.linalg.svd(normals.T @ normals)[1:]
         velocity = limit.mechanism.velocity[body, :3]
-        way = float(velocity @ axes[2])
+        slip = float(velocity @ axes[2])
         two = size[1] > _PLANE * size[0] > size[2]
-        if two and 2.0 * way * way > float(velocity @ velocity):
-            line[body] = np.sign(way) * axes[2]
+        if two and 2.0 * slip * slip > float(velocity @ velocity):
+            line[body] = np.sign(slip) * axes[2]
     return line if line[moves].any(axis=1).all() else np.zeros_like(line)
 
 
@@ -237,13 +237,13 @@ def slides_along_one_line(on: RigidAssembly, limit: LimitLoad) -> bool:
     Where they slide along several, as those of a dome that opens, no friction is across the line of sliding: that of
     each joint holds the others.
     """
-    motion, way = limit.mechanism, lines_of_sliding(on, limit)
-    if not way.any():
-        way = motion.velocity[:, :3]
+    motion, lines = limit.mechanism, lines_of_sliding(on, limit)
+    if not lines.any():
+        lines = motion.velocity[:, :3]
         turning = 0.5 * on.model.surfaces.size * np.linalg.norm(motion.velocity[:, 3:], axis=1)
         if turning @ turning > _PLANE * motion.speed @ motion.speed:
             return False
-    along, *across = np.linalg.svd(way, compute_uv=False) ** 2
+    along, *across = np.linalg.svd(lines, compute_uv=False) ** 2
     return bool(along > 0.0 and sum(across) <= _PLANE * along)
 
 
@@ -292,22 +292,24 @@ def _candidate(on: RigidAssembly, programme: Programme, bound: LimitLoad) -> Lim
     least[:, 0] = 1.0
     resting = Programme(on, None, bound.load).solve(on.strength, cost=least / len(least))
     first = _iterated(on, programme, bound.force, _FAR)
-    known = first.multiplier if first.converged else None
-    found = [first, _iterated(on, programme, resting.force, 0, known)]
-    ended = [one for one in found if one.converged] or [one for one in found if np.isfinite(one.multiplier)]
-    programmes = 2 + sum(one.programmes for one in found)
+    reached = first.multiplier if first.converged else None
+    endings = [first, _iterated(on, programme, resting.force, 0, reached)]
+    ended = [iteration for iteration in endings if iteration.converged] or [
+        iteration for iteration in endings if np.isfinite(iteration.multiplier)
+    ]
+    programmes = 2 + sum(iteration.programmes for iteration in endings)
     lower: LimitLoad | None = None
-    for one in sorted(ended or found[:1], key=lambda one: one.multiplier):
-        moving: Optimum = programme.solve(one.strength)
+    for ending in sorted(ended or endings[:1], key=lambda iteration: iteration.multiplier):
+        moving: Optimum = programme.solve(ending.strength)
         lower = LimitLoad(
             flow=Flow.COULOMB,
             load=bound.load,
-            multiplier=one.multiplier,
-            force=one.force,
+            multiplier=ending.multiplier,
+            force=ending.force,
             mechanism=mechanism(on, moving.velocity),
             programmes=programmes,
-            converged=one.converged,
-            beyond=one.beyond,
+            converged=ending.converged,
+            beyond=ending.beyond,
             lower=lower,
         )
     assert lower is not None
@@ -315,34 +317,40 @@ def _candidate(on: RigidAssembly, programme: Programme, bound: LimitLoad) -> Lim
 
 
 def _iterated(
-    on: RigidAssembly, programme: Programme, begin: Array, far: int, known: float | None = None
+    on: RigidAssembly, programme: Programme, begin: Array, unrestrained: int, reached: float | None = None
 ) -> _Ending:
     """Iterate the fictitious strength from forces (nc, 3), its slope falling to almost zero.
 
-    The first programmes, `far` of them, go as far as they like; what follows stays near the one before. It ends early,
-    without forces that meet the law, where it stays at a load that is `known`.
+    The first programmes, `unrestrained` of them, go as far as they like; what follows stays near the one before. It
+    ends early, without forces that meet the law, where it stays at a load that was `reached` before.
     """
-    own = on.strength
-    slope, held = own.friction, _normal(own, begin)
+    actual = on.strength
+    slope, normal = actual.friction, _normal(actual, begin)
     multipliers: list[float] = []
     ended = False
     while True:
-        slope = np.maximum(_FLATTER * slope, _DILATANCY * own.friction)
-        strength = Strength(slope, own.cohesion + (own.friction - slope) * held, own.tension)
-        free = len(multipliers) < far
-        found = programme.solve(strength, _CLAMPING, near=None if free else held - own.tension, pull=_NEARBY)
-        multipliers.append(found.multiplier)
-        if not np.isfinite(found.multiplier):
+        slope = np.maximum(_FLATTER * slope, _DILATANCY * actual.friction)
+        strength = Strength(slope, actual.cohesion + (actual.friction - slope) * normal, actual.tension)
+        free = len(multipliers) < unrestrained
+        optimum = programme.solve(
+            strength, _CLAMPING, near=None if free else normal - actual.tension, pull=_NEARBY
+        )
+        multipliers.append(optimum.multiplier)
+        if not np.isfinite(optimum.multiplier):
             break
-        held = held + (_MIXED if free else 1.0) * (_normal(own, found.force) - held)
-        stands = np.ptp(multipliers[-_TIMES:]) <= _STANDS * abs(found.multiplier)
-        near = _beyond(on, found.force) <= _BEYOND
-        ended = len(multipliers) > max(_FIRST, far + 1) and bool(stands) and near
+        normal = normal + (_MIXED if free else 1.0) * (_normal(actual, optimum.force) - normal)
+        stands = np.ptp(multipliers[-_TIMES:]) <= _STANDS * abs(optimum.multiplier)
+        within = _beyond(on, optimum.force) <= _BEYOND
+        ended = len(multipliers) > max(_FIRST, unrestrained + 1) and bool(stands) and within
         last = np.array(multipliers[-_AGAIN:])
-        again = known is not None and len(last) == _AGAIN and np.abs(last - known).max() <= _SAME * known
+        again = (
+            reached is not None and len(last) == _AGAIN and np.abs(last - reached).max() <= _SAME * reached
+        )
         if ended or again or len(multipliers) == _MOST:
             break
-    return _Ending(found.multiplier, found.force, strength, len(multipliers), ended, _beyond(on, found.force))
+    return _Ending(
+        optimum.multiplier, optimum.force, strength, len(multipliers), ended, _beyond(on, optimum.force)
+    )
 
 
 def _normal(strength: Strength, force: Array) -> Array:

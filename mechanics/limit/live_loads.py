@@ -30,13 +30,13 @@ class LiveLoad(Protocol):
 
 
 def _unit(direction: tuple[float, float, float], what: str) -> Array:
-    given = np.asarray(direction, dtype=float)
-    length = float(np.linalg.norm(given))
-    if given.shape != (3,) or not np.isfinite(length) or length == 0:
+    vector = np.asarray(direction, dtype=float)
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not np.isfinite(length) or length == 0:
         raise SceneError(
             f"direction = {list(direction)}", where=what, remedy="give three numbers, not all zero"
         )
-    return np.asarray(given / length)
+    return np.asarray(vector / length)
 
 
 @dataclass(frozen=True)

@@ -83,8 +83,8 @@ class LoadingTest:
     @property
     def calm(self) -> Bools:
         """Steps (n,) in which inertia changes the force by no more than 1 % of the largest."""
-        found: Bools = np.abs(self.inertia) <= _CALM * np.abs(self.force).max()
-        return found
+        calm: Bools = np.abs(self.inertia) <= _CALM * np.abs(self.force).max()
+        return calm
 
     @property
     def strength(self) -> tuple[float, float]:
@@ -107,9 +107,9 @@ class LoadingTest:
         goal = share * np.abs(self.force).max()
         first = int(np.argmax(np.abs(self.force) >= goal))
         places, forces = np.insert(self.displacement, 0, 0.0), np.insert(self.force, 0, 0.0)
-        one, two = np.abs(forces[first : first + 2])
-        part = (goal - one) / (two - one)
-        place = abs(places[first] + part * (places[first + 1] - places[first]))
+        before, after = np.abs(forces[first : first + 2])
+        fraction = (goal - before) / (after - before)
+        place = abs(places[first] + fraction * (places[first + 1] - places[first]))
         return float(goal / place)
 
     @property
@@ -126,25 +126,25 @@ class LoadingTest:
             np.insert(self.force[branch], 0, 0.0),
         )
         asked = sign * displacement
-        found: Array = np.interp(asked, places, forces, np.nan)
-        return np.where(asked > places[-1] * (1.0 + _DISPLACEMENT_ROUNDING), np.nan, found)
+        resisted: Array = np.interp(asked, places, forces, np.nan)
+        return np.where(asked > places[-1] * (1.0 + _DISPLACEMENT_ROUNDING), np.nan, resisted)
 
     @property
     def turning(self) -> float:
         """Share of the displacement that comes of turning, of the median stone by mass: rocking 1, sliding 0 [-]."""
-        model, end, own = self.model, self.end.after, self.free
-        spin = Rotation.from_matrix(end.rotation[own] @ self.settled.rotation[own].transpose(0, 2, 1))
+        model, end, stones = self.model, self.end.after, self.free
+        spin = Rotation.from_matrix(end.rotation[stones] @ self.settled.rotation[stones].transpose(0, 2, 1))
         angle = spin.as_rotvec() @ self.rig.axes[1]
         order = np.argsort(angle)
-        half = np.cumsum(model.mass[own][order])
+        half = np.cumsum(model.mass[stones][order])
         middle = angle[order][np.searchsorted(half, half[-1] / 2)]
         return float(middle * self.rig.height / self.displacement[-1])
 
 
 def _stones(model: Model) -> Bools:
     """Return the bodies (nb,) that are stones and not fixed."""
-    found: Bools = ~model.fixed & [block.code != BEAM for block in model.scene.blocks]
-    return found
+    stones: Bools = ~model.fixed & [block.code != BEAM for block in model.scene.blocks]
+    return stones
 
 
 class _Pushed:
@@ -160,8 +160,8 @@ class _Pushed:
         contacts = step.contacts
         side = np.isin(contacts.bodies, jaws)
         rows, touching = np.flatnonzero(side.any(axis=1)), side[side.any(axis=1)]
-        other = np.where(touching[:, 0], 1, 0)
-        self._body, self._arm = contacts.bodies[rows, other], contacts.arm[rows, other]
+        column = np.where(touching[:, 0], 1, 0)
+        self._body, self._arm = contacts.bodies[rows, column], contacts.arm[rows, column]
         self._start = self._height(start)
 
     def rise(self, state: State) -> float:
@@ -199,10 +199,10 @@ def loading_test(
     """
     _refuse_untestable(scene, rig, to)
     furthest = float(np.abs(to).max())
-    way = step or min(furthest / _STEPS, softening_step(scene))
+    increment = step or min(furthest / _STEPS, softening_step(scene))
     speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * furthest))
     path = JawPath(frozenset(JAWS if rig.has_beam else JAWS[:1]), rig.axes[0], to, speed)
-    duration = way / speed
+    duration = increment / speed
     scene = replace(scene, time=TimeSettings(duration, theta=1.0, duration=path.until + duration))
     model, begin = build_model(rigged(scene, rig, path))
     simulation = _settled(model, begin, rig, progress)

@@ -146,9 +146,9 @@ class Programme:
         objective[:count:3] += clamping * charge
         squares = np.zeros(len(objective))
         if near is not None:
-            held = near / self._unit
-            squares[:count:3] = pull * charge / (float(np.abs(held).mean()) or 1.0)
-            objective[:count:3] -= squares[:count:3] * held
+            target = near / self._unit
+            squares[:count:3] = pull * charge / (float(np.abs(target).mean()) or 1.0)
+            objective[:count:3] -= squares[:count:3] * target
         status, x, z = self._solved(
             cones, self._balance, "zero", -self._dead, objective, squares, clamping > 0
         )

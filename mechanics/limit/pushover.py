@@ -84,8 +84,8 @@ class Pushover:
 
         In others the stone gathers speed, or stones hit one another.
         """
-        found: Bools = np.abs(self.inertia) <= _CALM * self.limit
-        return found
+        calm: Bools = np.abs(self.inertia) <= _CALM * self.limit
+        return calm
 
     @property
     def peak(self) -> float:
@@ -100,8 +100,8 @@ class Pushover:
         if not len(below):
             return float("inf")
         last = int(below[0])
-        part = (values[last - 1] - multiplier) / (values[last - 1] - values[last])
-        return float(places[last - 1] + part * (places[last] - places[last - 1]))
+        fraction = (values[last - 1] - multiplier) / (values[last - 1] - values[last])
+        return float(places[last - 1] + fraction * (places[last] - places[last - 1]))
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class _Standing:
 def pushover(
     on: RigidAssembly,
     live: LiveLoad,
-    found: LimitLoad,
+    limit: LimitLoad,
     reach: float | None = None,
     points: int = 50,
     progress: Listener = silent,
@@ -158,7 +158,7 @@ def pushover(
     Parameters
     ----------
     on, live : the rigid stones, and the load
-    found : limit load, whose mechanism tells which stone is led: the one that moves fastest along the load
+    limit : limit load, whose mechanism tells which stone is led: the one that moves fastest along the load
     reach : way to which the curve is expected to go; None: half of the least width of the stones that move [m]
     points : of the curve over that way; it goes on to twice as many
     progress, stop : called and asked at every point
@@ -169,19 +169,19 @@ def pushover(
     SceneError : see `build_model`
     """
     load = live(on).reshape(-1, 6)
-    way = load[:, :3].sum(axis=0)
-    way = way / np.linalg.norm(way)
-    along = found.mechanism.velocity[on.free, :3] @ way
-    if not np.isfinite(found.multiplier) or not along.max(initial=0.0) > 0:
+    direction = load[:, :3].sum(axis=0)
+    direction = direction / np.linalg.norm(direction)
+    along = limit.mechanism.velocity[on.free, :3] @ direction
+    if not np.isfinite(limit.multiplier) or not along.max(initial=0.0) > 0:
         raise SolverError(
             "no mechanism moves along the load", where=str(live), remedy="take a load that has one"
         )
     led = int(on.free[along.argmax()])
-    moving = on.free[found.mechanism.speed[on.free] > 1e-2]
+    moving = on.free[limit.mechanism.speed[on.free] > 1e-2]
     if reach is None:
         reach = _REACH * float(on.model.surfaces.size[moving].min())
     speed = SPEED * float(np.sqrt(2.0 * np.linalg.norm(on.model.gravity(0.0)) * reach))
-    return _Run(on, load, led, way, reach / points, speed).curve(found, 2 * points, progress, stop)
+    return _Run(on, load, led, direction, reach / points, speed).curve(limit, 2 * points, progress, stop)
 
 
 class _Run:
@@ -197,19 +197,21 @@ class _Run:
     """
 
     def __init__(
-        self, on: RigidAssembly, load: Array, led: int, way: Array, interval: float, speed: float
+        self, on: RigidAssembly, load: Array, led: int, direction: Array, interval: float, speed: float
     ) -> None:
-        self._load, self._free, self._led, self._way = load, on.free, led, way
+        self._load, self._free, self._led, self._direction = load, on.free, led, direction
         self._interval, self._speed = interval, speed
         self._step = interval / (_PER_POINT * speed)
         self._model, state = build_model(_scene(on, load, self._step))
         self._simulation = Simulation(self._model, state)
 
-    def curve(self, found: LimitLoad, most: int, progress: Listener, stop: Callable[[], bool]) -> Pushover:
+    def curve(
+        self, candidate: LimitLoad, most: int, progress: Listener, stop: Callable[[], bool]
+    ) -> Pushover:
         """Return the curve of at most so many intervals."""
-        simulation, limit = self._simulation, found.multiplier
+        simulation, limit = self._simulation, candidate.multiplier
         begin = simulation.state.centre[self._led]
-        gain = self._gain(found.mechanism.velocity)
+        gain = self._gain(candidate.mechanism.velocity)
         multiplier, speed, onset = _BEGIN * limit, 0.0, 0.0
         work = load_work = energy = 0.0
         path, values, inertia = [0.0], list[float](), list[float]()
@@ -223,8 +225,8 @@ class _Run:
             velocity = simulation.state.velocity
             power = self._step * self._power(velocity)
             work, load_work = work + power, load_work + multiplier * power
-            before, speed = speed, float(velocity[self._led, :3] @ self._way)
-            moved = float((simulation.state.centre[self._led] - begin) @ self._way)
+            before, speed = speed, float(velocity[self._led, :3] @ self._direction)
+            moved = float((simulation.state.centre[self._led] - begin) @ self._direction)
             still = still + 1 if speed < _STANDS * self._speed else 0
             if still and not values:
                 onset = max(onset, multiplier)
@@ -247,7 +249,7 @@ class _Run:
         places = 0.5 * (np.array(path[:-1]) + np.array(path[1:]))
         return Pushover(
             control=self._code,
-            direction=self._way,
+            direction=self._direction,
             displacement=places,
             multiplier=np.array(values),
             inertia=np.array(inertia),
@@ -274,7 +276,7 @@ class _Run:
 
     def _gain(self, velocity: Array) -> float:
         """Return G, the acceleration of the stone per λ beyond equilibrium, of a mechanism (nb, 6) [m/s²]."""
-        led = float(velocity[self._led, :3] @ self._way)
+        led = float(velocity[self._led, :3] @ self._direction)
         return led * self._power(velocity) / self._twice_energy(velocity)
 
     def _power(self, velocity: Array) -> float:

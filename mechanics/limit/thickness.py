@@ -77,8 +77,8 @@ def geometric_safety(on: RigidAssembly, widest: float = 1.0) -> GeometricSafety:
 
 def _stands(on: RigidAssembly, share: float) -> tuple[Array, Mechanism | None]:
     """Return forces that balance the dead load with joints of a share of their widths; else how the stones fall."""
-    found = Programme(shrunk(on, share), None, "geometric safety").shortfall(on.strength)
-    return found.force, mechanism(on, found.velocity) if found.multiplier > _LACKING else None
+    shortfall = Programme(shrunk(on, share), None, "geometric safety").shortfall(on.strength)
+    return shortfall.force, mechanism(on, shortfall.velocity) if shortfall.multiplier > _LACKING else None
 
 
 def shrunk(on: RigidAssembly, share: float) -> RigidAssembly:

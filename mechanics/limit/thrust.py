@@ -71,19 +71,19 @@ def thrust(on: RigidAssembly, supports: Sequence[str], direction: tuple[float, f
     free = [on.model.scene.blocks[body].code for body in bodies if not on.model.fixed[body]]
     if free:
         raise SceneError(f"{free[0]} is not fixed", where=where, remedy="give stones that are fixed")
-    way, length = np.asarray(direction, dtype=float), float(np.linalg.norm(direction))
+    unit, length = np.asarray(direction, dtype=float), float(np.linalg.norm(direction))
     if not np.isfinite(length) or length == 0:
         raise SceneError(
             f"direction = {list(direction)}", where=where, remedy="give three numbers, not all zero"
         )
-    way = way / length
+    unit = unit / length
     push = on.push(bodies)
     if not push.nnz:
         raise SceneError("no joint meets the supports", where=where, remedy="give those that carry stones")
-    cost = (push.T @ way).reshape(-1, 3)
+    cost = (push.T @ unit).reshape(-1, 3)
     programme, moving = Programme(on, None, where), np.zeros((len(on.model.mass), 6))
-    moving[bodies, :3] = way
-    x, y, z = way.tolist()
+    moving[bodies, :3] = unit
+    x, y, z = unit.tolist()
     return Thrust(
         tuple(supports),
         (x, y, z),
@@ -96,14 +96,14 @@ def _extreme(
     on: RigidAssembly, programme: Programme, cost: Array, moving: Array, sign: float = 1.0
 ) -> Extreme:
     """Minimise cost · f; the supports move by `moving` (nb, 6) then."""
-    found = programme.solve(on.strength, cost=cost)
+    optimum = programme.solve(on.strength, cost=cost)
     # what rounding leaves of the weight is no thrust
-    total = float((cost * found.force).sum())
+    total = float((cost * optimum.force).sum())
     total = total if abs(total) > _THRUST_ROUNDING * on.weight else 0.0
-    value = {Ending.NO_BALANCE: np.nan, Ending.ENDLESS: -np.inf}.get(found.ending, total)
-    still = found.ending is not Ending.FOUND
+    value = {Ending.NO_BALANCE: np.nan, Ending.ENDLESS: -np.inf}.get(optimum.ending, total)
+    still = optimum.ending is not Ending.FOUND
     return Extreme(
         sign * value + 0.0,
-        found.force,
-        mechanism(on, found.velocity, np.zeros_like(moving) if still else moving),
+        optimum.force,
+        mechanism(on, optimum.velocity, np.zeros_like(moving) if still else moving),
     )

@@ -125,8 +125,8 @@ class PlanarDelassus:
     def gauss_seidel(self, shift: Array, friction: Array, cohesion: Array) -> "PlanarGaussSeidel":
         """Prepare sweeps on u = W r + shift with Coulomb's μ and the cohesion k, each (nc,)."""
         layout = self.layout
-        record, other = records(layout, shift, friction, cohesion, self.lever, self.normal, self.diagonal)
-        return PlanarGaussSeidel(layout, record, other, self.threads)
+        record, partner = records(layout, shift, friction, cohesion, self.lever, self.normal, self.diagonal)
+        return PlanarGaussSeidel(layout, record, partner, self.threads)
 
 
 @dataclass(frozen=True)

@@ -215,13 +215,13 @@ def _rested(asked: Deposit, centre: Array, radius: Array, progress: Listener) ->
     return _calm(run, asked, _SLOW, _RESTING, progress)
 
 
-def _calm(run: PlanarRun, asked: Deposit, slow: float, kept: float, progress: Listener) -> Array:
+def _calm(run: PlanarRun, asked: Deposit, slow: float, retained: float, progress: Listener) -> Array:
     """Make steps, damped, until the mean speed over √(g r) is below `slow`; return the centres."""
     count = len(run.model.radius)
     while not run.done:
         last = run.step()
         state = run.simulation.state
-        run.simulation.state = replace(state, velocity=kept * state.velocity)
+        run.simulation.state = replace(state, velocity=retained * state.velocity)
         speed = float(np.hypot(*last.after.velocity[:count, :2].T).mean())
         progress(Progress("deposit", run.steps, None, f"mean speed {speed:.1e} m/s"))
         if run.steps >= _FEWEST and speed < slow * np.sqrt(asked.gravity * asked.smallest):

@@ -49,17 +49,17 @@ def refuse_deep(model: PlanarModel, contacts: PlanarContacts) -> None:
     SceneError : naming the two bodies that overlap most, the place, and how many more there are
     """
     scene, radius = model.scene, 0.5 * contacts.size
-    part = -contacts.gap / radius
-    deep = np.flatnonzero(part > scene.start_overlap * (1.0 + _OVERLAP_ROUNDING))
+    ratio = -contacts.gap / radius
+    deep = np.flatnonzero(ratio > scene.start_overlap * (1.0 + _OVERLAP_ROUNDING))
     if not len(deep):
         return
-    worst = deep[np.argmax(part[deep])]
+    worst = deep[np.argmax(ratio[deep])]
     codes, (first, second) = scene.codes, contacts.bodies[worst].tolist()
     across = second >= len(model.radius)
     x, y = contacts.point[worst]
     more = f"; so do {len(deep) - 1} more pairs" if len(deep) > 1 else ""
     raise SceneError(
-        f"at the start they overlap by {-contacts.gap[worst]:.4g} m at ({x:.6g}, {y:.6g}), {part[worst]:.0%} of the "
+        f"at the start they overlap by {-contacts.gap[worst]:.4g} m at ({x:.6g}, {y:.6g}), {ratio[worst]:.0%} of the "
         f"radius {radius[worst]:.4g} m; {scene.start_overlap:.0%} is allowed{more}",
         where=f"disk {codes[first]!r} and {'wall' if across else 'disk'} {codes[second]!r}",
         remedy="move the wall or the disk" if across else "move them apart, or leave one out",
@@ -131,15 +131,15 @@ class Overlaps(Carrier):
         if not (-gap).max(initial=0.0) > (_REMAINING_OVERLAP + _BEYOND) * self._allowed:
             return end
         of_start = _recalled(self._key, self._gap, contacts.key)
-        left = np.minimum(of_start, -_REMAINING_OVERLAP * self._allowed)
-        limit = left - _BEYOND * self._allowed
+        remaining = np.minimum(of_start, -_REMAINING_OVERLAP * self._allowed)
+        limit = remaining - _BEYOND * self._allowed
         opening = np.maximum(operator.relative_velocity(state.velocity)[:, 0], 0.0)
         ahead = np.where(terms.bias < 0, gap + step * opening, gap)
         ahead[~np.isfinite(terms.bias)] = np.inf
         if not (ahead < limit).any():
             return end
         shift, none = np.zeros((len(gap), 2)), np.zeros(len(gap))
-        shift[:, 0] = ahead - left
+        shift[:, 0] = ahead - remaining
         sweep = operator.gauss_seidel(shift, terms.friction, none)
         push = _AGAIN * _recalled(self._pushed, self._push, contacts.key)
         for _ in range(_SWEEPS // _LOOK):

@@ -223,13 +223,13 @@ class PlanarScene:
         check_settings(self.name, self)
         self._check_named(distinct)
 
-    def _check_named(self, known: set[str]) -> None:
+    def _check_named(self, bodies: set[str]) -> None:
         """Check that rules and loads name bodies of the scene, and motions only fixed ones."""
         named = [(rule.first | rule.second, "a contact rule") for rule in self.rules]
         named += [(force.stones, "a force") for force in self.loads.forces]
         named += [(motion.stones, "a motion") for motion in self.loads.motions]
         for codes, what in named:
-            missing = sorted(codes - known)
+            missing = sorted(codes - bodies)
             if missing:
                 raise SceneError(f"{what} names {missing[0]!r}, which is not there", where=self.name)
         free = {disk.code for disk in self.disks if not disk.fixed}

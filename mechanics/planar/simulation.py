@@ -283,10 +283,10 @@ class PlanarSimulation(Carrier):
             problem.friction[acting],
             problem.cohesion[acting],
         )
-        part = solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
+        solved = solver(some, start=ContactStart(shifted[acting], start.velocity[acting]))
         impulse, velocity = np.zeros_like(shifted), np.zeros_like(shifted)
-        impulse[acting], velocity[acting] = part.impulse, part.velocity
-        return replace(part, impulse=impulse, velocity=velocity)
+        impulse[acting], velocity[acting] = solved.impulse, solved.velocity
+        return replace(solved, impulse=impulse, velocity=velocity)
 
     def _apart(self, after: PlanarState, solved: _Solved) -> Apart:
         """Return the end of the step, where disks that overlap too far are moved apart."""

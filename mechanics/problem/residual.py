@@ -85,8 +85,8 @@ def _broken_velocity(problem: ContactProblem, impulse: Array, largest: float, pa
     hidden = _EPSILON * float(diagonal.max()) * float(np.abs(impulse).max()) / max(pace, bias)
     if hidden > _NOTHING:
         # the maxima may come from different contacts
-        own = np.einsum("cij,cj->ci", np.abs(diagonal), np.abs(impulse))
-        hidden = _EPSILON * float(own.max()) / max(pace, bias)
+        velocity = np.einsum("cij,cj->ci", np.abs(diagonal), np.abs(impulse))
+        hidden = _EPSILON * float(velocity.max()) / max(pace, bias)
     return max(largest / slowest, hidden)
 
 

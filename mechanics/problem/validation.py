@@ -15,14 +15,14 @@ _WHERE = "contact problem"
 _UNITS = "take units in which they are nearer to 1"
 
 
-def require_finite(**given: Array) -> None:
+def require_finite(**arrays: Array) -> None:
     """Refuse arrays, one row for each contact, with an entry that is not finite.
 
     Raises
     ------
     SolverError : naming the array, the contact and the value
     """
-    for name, values in given.items():
+    for name, values in arrays.items():
         finite = np.isfinite(values)
         if not finite.all():
             place = tuple(int(i) for i in np.argwhere(~finite)[0])

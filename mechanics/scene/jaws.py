@@ -30,8 +30,8 @@ class JawPath:
 
     def __init__(self, stones: frozenset[str], direction: Array, to: Sequence[float], speed: float) -> None:
         self.stones, self._direction = stones, direction
-        self._way = np.concatenate([[0.0], to])
-        self._time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self._way)))]) / speed
+        self._path = np.concatenate([[0.0], to])
+        self._time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self._path)))]) / speed
         self.rise = 0.0
 
     @property
@@ -41,7 +41,7 @@ class JawPath:
 
     def at(self, time: float) -> float:
         """Return the displacement at `time` [m]."""
-        return float(np.interp(time, self._time, self._way))
+        return float(np.interp(time, self._time, self._path))
 
     def pose(self, time: float) -> Pose:
         """Return the pose at `time` [s]."""

@@ -47,11 +47,13 @@ class Auto:
             return ContactSolution(start.impulse, start.velocity, 0, 0.0, True, "nothing: no contacts")
         warm, steps = bool(start.impulse.any()), start.motion
         if warm and not steps:
-            left = residual(problem, start.impulse)
+            remaining = residual(problem, start.impulse)
             # at the limits they would set rigid stones in motion that a relaxation halts, and so on
             share = FURTHER if steps is None and problem.delassus.rigid is not None else 1.0
-            if left.within(share * limits[0], share * limits[1]):
-                return ContactSolution(start.impulse.copy(), left.dual, 0, left.natural_map, True, KEPT)
+            if remaining.within(share * limits[0], share * limits[1]):
+                return ContactSolution(
+                    start.impulse.copy(), remaining.dual, 0, remaining.natural_map, True, KEPT
+                )
         follows = steps is not None and problem.delassus.rigid is not None
         # a motion that has long been still may have come to rest: one step brakes it, one finds its forces
         moving = warm and follows and steps not in (1, 2)
@@ -148,5 +150,10 @@ def _judged(
     problem: ContactProblem, solution: ContactSolution, limits: tuple[float, float]
 ) -> ContactSolution:
     """Return a solution of a problem with closed gaps, as the problem itself judges it."""
-    left = residual(problem, solution.impulse)
-    return replace(solution, velocity=left.dual, natural_map=left.natural_map, converged=left.within(*limits))
+    remaining = residual(problem, solution.impulse)
+    return replace(
+        solution,
+        velocity=remaining.dual,
+        natural_map=remaining.natural_map,
+        converged=remaining.within(*limits),
+    )

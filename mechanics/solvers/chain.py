@@ -32,7 +32,7 @@ class Solver(Protocol):
 class Begin(Enum):
     """Start of a link."""
 
-    GIVEN = auto()  # forces of the last step
+    WARM = auto()  # forces of the last step
     AHEAD = auto()  # forces of the last two steps, extrapolated
     NOTHING = auto()  # no force
     BEST = auto()  # best iterate of the links before
@@ -75,8 +75,10 @@ def follow(
     limits : tolerances of η and of velocities [-]
     most : iterations of all links together
     """
-    left = residual(problem, start.impulse)
-    best = ContactSolution(start.impulse.copy(), left.dual, 0, left.natural_map, left.within(*limits), KEPT)
+    remaining = residual(problem, start.impulse)
+    best = ContactSolution(
+        start.impulse.copy(), remaining.dual, 0, remaining.natural_map, remaining.within(*limits), KEPT
+    )
     before, count = "warm start" if start.impulse.any() else "cold start", 0
     for link in links:
         if count >= most:
@@ -91,11 +93,11 @@ def follow(
             before = f"{link.name} failed: {error.what}"
             continue
         count += solution.iterations
-        left = residual(problem, solution.impulse)
+        remaining = residual(problem, solution.impulse)
         solution = replace(
             solution,
-            natural_map=left.natural_map,
-            converged=left.within(*limits),
+            natural_map=remaining.natural_map,
+            converged=remaining.within(*limits),
             why=f"{link.name}: {before}",
         )
         before = f"{link.name} stood at η {solution.natural_map:.0e}"

@@ -76,8 +76,8 @@ ENDED_PATH = (_path, _newton)
 _long = replace(_newton, iterations=_PATH)
 _released = replace(_long, begin=Begin.RELEASED)
 _REST = (
-    replace(_exact, begin=Begin.GIVEN),
-    replace(_admm, begin=Begin.GIVEN),
+    replace(_exact, begin=Begin.WARM),
+    replace(_admm, begin=Begin.WARM),
     _newton,
     _path,
     _released,
@@ -90,7 +90,7 @@ _FROM_NOTHING = Link(
     "Newton from soft joints",
     partial(SofterJoints, factors=tuple(share / HELD for share in JOINTS)),
     _FAR,
-    Begin.GIVEN,
+    Begin.WARM,
     EXACT,
 )
 # Newton's method has failed twice where iterations begin: the path goes on
@@ -100,8 +100,8 @@ _REST_FROM_NOTHING = (
     replace(_REST[1], iterations=_ADMM_FROM_NOTHING, further=FURTHER),
     *_REST[3:],
 )
-_REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.GIVEN), _newton, _path, _newton)
-_REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.GIVEN),)
+_REST_OF_SOME = (replace(_admm, method=_rest, begin=Begin.WARM), _newton, _path, _newton)
+_REST_OF_MANY = (replace(_endless, method=_rest, begin=Begin.WARM),)
 _MOTION = (
     replace(_admm, method=_motion, begin=Begin.AHEAD),
     *(_long, _admm, _long, _admm),
@@ -111,13 +111,13 @@ _MOTION = (
 # friction would hold what falls
 _MOTION_OF_FEW = (replace(_newton, begin=Begin.AHEAD), *_MOTION)
 # errors that are allowed would be extrapolated with the rest
-_LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.GIVEN),)
+_LOOSE_MOTION = (replace(_endless, method=_loosely, begin=Begin.WARM),)
 _MOTION_OF_MANY = (replace(_endless, begin=Begin.AHEAD),)
-_SOFTER = Link("Newton from softer joints", SofterJoints, _PATH, Begin.GIVEN, EXACT)
-_SPRINGS = (replace(_exact, begin=Begin.GIVEN), _SOFTER, _path)
-_SPRINGS_OF_SOME = (replace(_admm, begin=Begin.GIVEN), _exact, _SOFTER, _path)
+_SOFTER = Link("Newton from softer joints", SofterJoints, _PATH, Begin.WARM, EXACT)
+_SPRINGS = (replace(_exact, begin=Begin.WARM), _SOFTER, _path)
+_SPRINGS_OF_SOME = (replace(_admm, begin=Begin.WARM), _exact, _SOFTER, _path)
 _DEFORMABLE = (
-    replace(_newton, begin=Begin.GIVEN, further=1.0),
+    replace(_newton, begin=Begin.WARM, further=1.0),
     *(_path, _newton),
     *(_from_best, _newton),
     replace(_SOFTER, further=1.0),
@@ -128,12 +128,12 @@ _AMONG_RIGID = (replace(_from_best, near=_NEAR), _path, _from_best, _from_best)
 _STONES_AS_RIGID = Link("stones as rigid ones", StonesAsRigid, _ADMM, Begin.BEST, 100.0)
 _SPRINGS_AMONG_RIGID = (replace(_exact, near=_NEAR), _STONES_AS_RIGID, _exact, _STONES_AS_RIGID, _exact)
 _DISKS = (
-    Link("sweeps", _sweeps, _ADMM, Begin.GIVEN),
-    Link("ADMM of disks", DiskADMM, _ADMM, Begin.GIVEN),
+    Link("sweeps", _sweeps, _ADMM, Begin.WARM),
+    Link("ADMM of disks", DiskADMM, _ADMM, Begin.WARM),
     Link("ADMM of disks", DiskADMM),
 )
-_FEW_DISKS = (*_DISKS[:2], replace(_long, begin=Begin.GIVEN), _DISKS[2])
-_SWEEPS = (Link("sweeps", NSGS, begin=Begin.GIVEN),)
+_FEW_DISKS = (*_DISKS[:2], replace(_long, begin=Begin.WARM), _DISKS[2])
+_SWEEPS = (Link("sweeps", NSGS, begin=Begin.WARM),)
 
 
 def chain_of(

@@ -34,18 +34,18 @@ def _clipped(polygon: Array, count: Ints, a: Array, b: Array, wanted: Bools) -> 
     meant = place < count[:, None]
     after = following(count, most)
     along, away = (b - a)[:, None], polygon - a[:, None]
-    left = np.where(wanted[:, None], along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0], 1.0)
+    side = np.where(wanted[:, None], along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0], 1.0)
     rows = np.arange(number)[:, None]
-    ahead = left[rows, after]
-    crosses = meant & (left * ahead < 0)
-    part = np.where(crosses, left, 0.0) / np.where(crosses, left - ahead, 1.0)
-    crossing = polygon + part[..., None] * (polygon[rows, after] - polygon)
+    ahead = side[rows, after]
+    crosses = meant & (side * ahead < 0)
+    fraction = np.where(crosses, side, 0.0) / np.where(crosses, side - ahead, 1.0)
+    crossing = polygon + fraction[..., None] * (polygon[rows, after] - polygon)
     # each corner gives itself, if it is kept, and then the point where its edge crosses the line
-    found = np.stack([polygon, crossing], axis=2).reshape(number, 2 * most, 2)
-    inside = np.stack([meant & (left >= 0), crosses], axis=2).reshape(number, 2 * most)
+    corners = np.stack([polygon, crossing], axis=2).reshape(number, 2 * most, 2)
+    inside = np.stack([meant & (side >= 0), crosses], axis=2).reshape(number, 2 * most)
     order = np.argsort(~inside, axis=1, kind="stable")
     left_over = inside.sum(axis=1)
-    return found[rows, order][:, : max(int(left_over.max(initial=0)), 1)], left_over
+    return corners[rows, order][:, : max(int(left_over.max(initial=0)), 1)], left_over
 
 
 def moments(polygon: Array, count: Ints) -> tuple[Array, Array, Array]:

@@ -100,8 +100,8 @@ class Material:
         if self.orthotropy is None:
             stiffness = _isotropic(self.young, self.poisson)
         else:
-            own = np.linalg.inv(_compliance(self.orthotropy)).astype(np.float64)
-            stiffness = _turned(own, np.array(self.orthotropy.axes, dtype=float))
+            principal = np.linalg.inv(_compliance(self.orthotropy)).astype(np.float64)
+            stiffness = _turned(principal, np.array(self.orthotropy.axes, dtype=float))
         stiffness.flags.writeable = False
         return stiffness
 

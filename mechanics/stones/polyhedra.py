@@ -141,12 +141,12 @@ def united(parts: Sequence[MassProperties]) -> MassProperties:
     """Unite the mass properties of parts that do not overlap (Steiner's theorem)."""
     if len(parts) == 1:
         return parts[0]
-    volume = sum(part.volume for part in parts)
-    centroid = sum((part.volume * part.centroid for part in parts), np.zeros(3)) / volume
+    volume = sum(piece.volume for piece in parts)
+    centroid = sum((piece.volume * piece.centroid for piece in parts), np.zeros(3)) / volume
     inertia = np.zeros((3, 3))
-    for part in parts:
-        arm = part.centroid - centroid
-        inertia += part.inertia + part.volume * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    for piece in parts:
+        arm = piece.centroid - centroid
+        inertia += piece.inertia + piece.volume * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return MassProperties(volume, centroid, inertia)
 
 

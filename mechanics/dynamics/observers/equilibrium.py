@@ -104,7 +104,9 @@ def support_reaction(model: Model, contacts: Contacts, force: Array, load: Array
     sign = model.fixed[contacts.bodies[:, 1]].astype(float) - model.fixed[contacts.bodies[:, 0]]
     weight = model.mass * g
     borne = np.where(model.elastic, weight, -load[:, :3] @ up)
-    return Support(float(sign @ (force @ up)), *(float(one[~model.fixed].sum()) for one in (weight, borne)))
+    return Support(
+        float(sign @ (force @ up)), *(float(vertical[~model.fixed].sum()) for vertical in (weight, borne))
+    )
 
 
 def settlement(model: Model, start: State, state: State) -> Array:

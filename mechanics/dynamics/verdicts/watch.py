@@ -121,7 +121,7 @@ class Watch(Carrier):
             self._sunk, self._speed = float(sunk[self._culprit]), float(speeds[self._culprit])
             return Outcome.COLLAPSED
         if falling.any():
-            proven = falling & ~np.array([self._unsolved.may_cause(one) for one in speeds])
+            proven = falling & ~np.array([self._unsolved.may_cause(fastest) for fastest in speeds])
             self._blame(proven if proven.any() else falling, sunk, speeds)
             if not proven.any():
                 return Outcome.UNDECIDED
@@ -195,8 +195,10 @@ class Watch(Carrier):
         if outcome is Outcome.SETTLED:
             share = _percent(self._moved / float(self._model.surfaces.size[self._culprit]))
             lower = self._sunk > _LOWER * self._moved
-            way = f"{length(self._sunk)} lower" if lower else f"{length(self._moved)} away"
-            return f"it does not stand as surveyed: stone {code} came to rest {way}, {share} of its width"
+            distance = f"{length(self._sunk)} lower" if lower else f"{length(self._moved)} away"
+            return (
+                f"it does not stand as surveyed: stone {code} came to rest {distance}, {share} of its width"
+            )
         if outcome is Outcome.COLLAPSED and self._collapse is not None and self._time > self._collapse[3]:
             _, sunk, pace, time = self._collapse
             end = (

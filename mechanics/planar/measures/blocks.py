@@ -66,8 +66,8 @@ def blocks_of(start: Array, now: Array, radius: Array, reach: float) -> Blocks:
     """
     count = len(radius)
     pairs = cKDTree(start).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")
-    kept = _holds(pairs, start, radius, reach) & _holds(pairs, now, radius, reach)
-    first, second = pairs[kept].T
+    intact = _holds(pairs, start, radius, reach) & _holds(pairs, now, radius, reach)
+    first, second = pairs[intact].T
     joined = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
     label = connected_components(joined, directed=False)[1]
     size = np.bincount(label)

@@ -101,8 +101,8 @@ def crest_radius(place: Array, height: Array) -> float:
     middle = place - place.mean()
     design = np.vander(middle, 3)
     fit, _, _, _ = np.linalg.lstsq(design, height, rcond=None)
-    left = height - design @ fit
-    variance = float(left @ left) / (len(place) - 3) * np.linalg.inv(design.T @ design)[0, 0]
+    deviation = height - design @ fit
+    variance = float(deviation @ deviation) / (len(place) - 3) * np.linalg.inv(design.T @ design)[0, 0]
     curved, slope = float(fit[0]), float(fit[1])
     # rounding alone leaves no error to compare with
     if -curved <= max(_CERTAIN * np.sqrt(variance), 1e-9 / np.ptp(place)):

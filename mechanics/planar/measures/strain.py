@@ -39,7 +39,9 @@ def deformation(start: Array, now: Array, cells: Tessellation) -> DiskDeformatio
     local = (after @ np.linalg.inv(before)).reshape(-1, 4) * cells.area[:, None]
     count, disks = len(start), cells.triangles.ravel()
     weight = np.bincount(disks, np.repeat(cells.area, 3), minlength=count)
-    total = np.stack([np.bincount(disks, np.repeat(one, 3), minlength=count) for one in local.T], axis=1)
+    total = np.stack(
+        [np.bincount(disks, np.repeat(component, 3), minlength=count) for component in local.T], axis=1
+    )
     with np.errstate(invalid="ignore", divide="ignore"):
         gradient = (total / weight[:, None]).reshape(-1, 2, 2)
     volume = gradient[:, 0, 0] * gradient[:, 1, 1] - gradient[:, 0, 1] * gradient[:, 1, 0] - 1.0

@@ -119,7 +119,7 @@ def trishear_fit(
         if best is None or fit.cost < best.cost:
             best = fit
     assert best is not None
-    left, whole = float(np.sum(misfit(best.x) ** 2)), float(np.sum((moved - place) ** 2))
-    residual = float(np.sqrt(left / len(place)))
-    explained = 1.0 - left / whole if whole > 0 else float("nan")
+    unexplained, whole = float(np.sum(misfit(best.x) ** 2)), float(np.sum((moved - place) ** 2))
+    residual = float(np.sqrt(unexplained / len(place)))
+    explained = 1.0 - unexplained / whole if whole > 0 else float("nan")
     return TrishearFit(Trishear(tip, dip, *map(float, best.x)), residual, residual / abs(slip), explained)

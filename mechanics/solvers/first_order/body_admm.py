@@ -115,9 +115,9 @@ class BodyADMM:
             run.iterate()
             run.look()
         impulse, velocity = run.best()
-        left = residual(problem, impulse)
-        within = left.within(self.tolerance, self.velocity_tolerance)
-        return ContactSolution(impulse, velocity, run.iterations, left.natural_map, within)
+        remaining = residual(problem, impulse)
+        within = remaining.within(self.tolerance, self.velocity_tolerance)
+        return ContactSolution(impulse, velocity, run.iterations, remaining.natural_map, within)
 
 
 class _Run:
@@ -198,9 +198,9 @@ class _Run:
         groups = self._bodies.groups
         share = at_once(len(groups))
 
-        def each(stage: Callable[..., float | None], *given: object) -> list[float | None]:
+        def each(stage: Callable[..., float | None], *arguments: object) -> list[float | None]:
             """Make a stage for all groups of bodies, by threads."""
-            return share(lambda group: stage(group, iterate, *given), groups)
+            return share(lambda group: stage(group, iterate, *arguments), groups)
 
         step = np.empty(len(iterate.load), factors.value.dtype)
         each(kernel.begin, touching, factors)
@@ -254,8 +254,8 @@ class _Run:
         if np.isfinite(self._change) and excess > 0:
             self._limit = self._change * self.goal / excess
         if self.iterations == 0 or excess < self.excess:
-            found = self._iterate.x.copy(), self._z.copy(), self._soft
-            self.excess, self._best = float(excess), found
+            snapshot = self._iterate.x.copy(), self._z.copy(), self._soft
+            self.excess, self._best = float(excess), snapshot
 
     def best(self) -> tuple[Array, Array]:
         """Return the impulses and the velocities û (nc, 3) of the best look, local frames."""
@@ -432,8 +432,8 @@ def _groups(panels: cholesky.Panels, parts: Parts, runs: kernel.Runs, threads: i
     # a block of contacts costs as much as the numbers that it reads and writes
     work = numbers + kernel.ROWS * kernel.BLOCK * np.diff(runs.block[runs.part])
     shares: list[list[int]] = [[] for _ in range(threads)]
-    for part in np.argsort(-work, kind="stable"):
-        min(shares, key=lambda one: work[one].sum()).append(int(part))
+    for piece in np.argsort(-work, kind="stable"):
+        min(shares, key=lambda assigned: work[assigned].sum()).append(int(piece))
     return [np.array(share, dtype=np.int64) for share in shares]
 
 

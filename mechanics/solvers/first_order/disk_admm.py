@@ -57,26 +57,26 @@ class DiskADMM:
             )
         limits = self.tolerance, self.velocity_tolerance
         impulse = project_on_cone(start.impulse, problem.friction, problem.cohesion)
-        left = residual(problem, impulse)
-        best, iterations = (left, impulse, start.velocity), 0
-        if left.within(*limits) or self.max_iterations == 0:
+        remaining = residual(problem, impulse)
+        best, iterations = (remaining, impulse, start.velocity), 0
+        if remaining.within(*limits) or self.max_iterations == 0:
             return _solution(best, iterations, limits)
         run = _Run(problem, contacts, self.penalty, impulse, start.velocity)
-        while not left.within(*limits) and iterations < self.max_iterations:
+        while not remaining.within(*limits) and iterations < self.max_iterations:
             count = min(self.check_every, self.max_iterations - iterations)
             run.advance(count)
             iterations += count
-            left = residual(problem, run.impulse)
-            if left.natural_map <= best[0].natural_map or left.within(*limits):
-                best = left, run.impulse.copy(), run.velocity
+            remaining = residual(problem, run.impulse)
+            if remaining.natural_map <= best[0].natural_map or remaining.within(*limits):
+                best = remaining, run.impulse.copy(), run.velocity
         return _solution(best, iterations, limits)
 
 
 def _solution(
     best: tuple[Residual, Array, Array], iterations: int, limits: tuple[float, float]
 ) -> ContactSolution:
-    left, impulse, velocity = best
-    return ContactSolution(impulse, velocity, iterations, left.natural_map, left.within(*limits))
+    remaining, impulse, velocity = best
+    return ContactSolution(impulse, velocity, iterations, remaining.natural_map, remaining.within(*limits))
 
 
 class _Run:

@@ -54,22 +54,26 @@ class NSGS:
     def __call__(self, problem: ContactProblem, start: ContactStart) -> ContactSolution:
         """Solve from the impulses of `start`; return the best of all looks."""
         impulse = start.impulse.copy()
-        left = residual(problem, impulse)
-        best, sweeps = (impulse, left), 0
+        remaining = residual(problem, impulse)
+        best, sweeps = (impulse, remaining), 0
         limits = self.tolerance, self.velocity_tolerance
-        if self.min_iterations or not left.within(*limits):
+        if self.min_iterations or not remaining.within(*limits):
             shift = problem.biased
             sweep = problem.delassus.gauss_seidel(shift, problem.friction, problem.cohesion)
             look = _Look(problem, sweep, self.depth, limits)
-            while sweeps < self.min_iterations or (not left.within(*limits) and sweeps < self.max_iterations):
+            while sweeps < self.min_iterations or (
+                not remaining.within(*limits) and sweeps < self.max_iterations
+            ):
                 count = min(self.check_every, self.max_iterations - sweeps)
-                impulse, left = look(impulse, count)
+                impulse, remaining = look(impulse, count)
                 sweeps += count
-                if left.natural_map <= best[1].natural_map:
-                    best = impulse.copy(), left
-        if not left.within(*limits):
-            impulse, left = best
-        return ContactSolution(impulse, left.dual, sweeps, left.natural_map, left.within(*limits))
+                if remaining.natural_map <= best[1].natural_map:
+                    best = impulse.copy(), remaining
+        if not remaining.within(*limits):
+            impulse, remaining = best
+        return ContactSolution(
+            impulse, remaining.dual, sweeps, remaining.natural_map, remaining.within(*limits)
+        )
 
 
 class _Look:
@@ -88,13 +92,13 @@ class _Look:
             return impulse, residual(self._problem, impulse)
         swept = impulse.copy()
         self._sweep(swept, count)
-        left = residual(self._problem, swept)
+        remaining = residual(self._problem, swept)
         candidate = self._anderson(impulse, swept)
-        if candidate is None or left.within(*self._limits):
-            return swept, left
+        if candidate is None or remaining.within(*self._limits):
+            return swept, remaining
         candidate = project_on_cone(candidate, self._problem.friction, self._problem.cohesion)
         bold = residual(self._problem, candidate)
-        if bold.natural_map < _BAD * left.natural_map:
+        if bold.natural_map < _BAD * remaining.natural_map:
             return candidate, bold
         self._anderson.forget()
-        return swept, left
+        return swept, remaining

@@ -141,10 +141,10 @@ class CentralPath:
         diagonal = np.column_stack([mu[cone], np.ones((len(cone), 2))])
         point = diagonal * start[cone]
         point[:, 0] += k[cone]
-        slack, other = central(
+        slack, dual_start = central(
             point - dual[cone] / (np.maximum(diagonal, ROUNDING) * scale), level * size * size
         )
-        self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * other)
+        self._cone = _Cone(cone, mu[cone], k[cone], slack, scale * dual_start)
         point = start[side, 0] - normal / scale
         root = np.sqrt(point**2 + 4.0 * level * size * size)
         self._side = _Side(side, 0.5 * (root + point), 0.5 * scale * (root - point))
@@ -251,8 +251,8 @@ class _Newton:
         square -= product(self._scaling.inverse(slack), self._scaling(dual))
         square[:, 0] += level
         side = self._side
-        own = level - side.slack * side.dual - slack_n * dual_n
-        return divide(self._lambda, square), own / side.dual
+        complementarity = level - side.slack * side.dual - slack_n * dual_n
+        return divide(self._lambda, square), complementarity / side.dual
 
     def recentred(self, step: tuple[Array, ...], level: float) -> tuple[Array, Array]:
         """Return the right side of a correction: of the pairs that a whole step would leave far from the level."""

@@ -82,9 +82,9 @@ class InteriorPoint:
         return _solution(best, count)
 
     def _looked(self, problem: ContactProblem, impulse: Array) -> "_Look":
-        left = residual(problem, impulse)
-        excess = max(left.natural_map / self.tolerance, left.velocity / self.velocity_tolerance)
-        return _Look(impulse, left, excess)
+        remaining = residual(problem, impulse)
+        excess = max(remaining.natural_map / self.tolerance, remaining.velocity / self.velocity_tolerance)
+        return _Look(impulse, remaining, excess)
 
 
 @dataclass(frozen=True)

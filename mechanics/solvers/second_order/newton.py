@@ -76,9 +76,13 @@ class Newton:
             solved = run.left.within(*limits)
             if solved or idle > _IDLE or run.iterations >= self.max_iterations or not run.step():
                 break
-        left, impulse = (run.left, run.r) if run.left.within(*limits) else best
+        remaining, impulse = (run.left, run.r) if run.left.within(*limits) else best
         return ContactSolution(
-            run.unit * impulse, left.dual, run.iterations, left.natural_map, left.within(*limits)
+            run.unit * impulse,
+            remaining.dual,
+            run.iterations,
+            remaining.natural_map,
+            remaining.within(*limits),
         )
 
 

@@ -91,13 +91,13 @@ class _BodyEquations:
         moving = np.flatnonzero(inertia[:, 0] > 0)
         place = np.full(len(inertia), -1)
         place[moving] = np.arange(len(moving))
-        own = np.zeros((len(moving), 2, 3, 3))
-        own[:, 0] = np.eye(3) / inertia[moving, 0][:, None, None]
+        diagonal = np.zeros((len(moving), 2, 3, 3))
+        diagonal[:, 0] = np.eye(3) / inertia[moving, 0][:, None, None]
         upper = inertia[moving][:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
-        own[:, 1] = np.linalg.inv(upper)
+        diagonal[:, 1] = np.linalg.inv(upper)
         side = place[contacts.body]
         blocks, width, indices, indptr = _pattern(side, len(moving))
-        self._blocks = bodies.BodyBlocks(place, blocks, own, width)
+        self._blocks = bodies.BodyBlocks(place, blocks, diagonal, width)
         nc = len(contacts.body)
         self._inverse, self._gain = np.empty((2, nc, 3, 3))
         self._value = np.empty((len(indices), 3, 3))
@@ -190,8 +190,8 @@ def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:
     s, t = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = side[:, s], side[:, t]
     valid = (row >= 0) & (column >= 0)
-    own = np.arange(count) * (count + 1)
-    keys, where = np.unique(np.concatenate([own, (row * count + column)[valid]]), return_inverse=True)
+    diagonal = np.arange(count) * (count + 1)
+    keys, where = np.unique(np.concatenate([diagonal, (row * count + column)[valid]]), return_inverse=True)
     degree = np.bincount(keys // count, minlength=count)
     before = np.concatenate([[0], np.cumsum(degree)[:-1]]).astype(np.int64)
     within = np.arange(len(keys)) - before[keys // count]
@@ -202,6 +202,6 @@ def _pattern(side: Ints, count: int) -> tuple[Ints, Ints, Ints, Ints]:
     columns = 2 * (keys % count)
     both = np.column_stack([columns, columns + 1]).ravel()
     parts = np.split(both, 2 * before[1:])
-    indices = np.concatenate([part for part in parts for _ in range(2)]).astype(np.int64)
+    indices = np.concatenate([index for index in parts for _ in range(2)]).astype(np.int64)
     indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int64)
     return blocks, width, indices, indptr

@@ -45,8 +45,11 @@ def to_bounds(x: Array, low: float, high: float) -> Array:
     """
     size = tangential(x)
     along = x[:, 1:] / np.maximum(size, 1e-300)[:, None]
-    one, two = (np.maximum(np.clip(own, low, high) - own, -high) for own in (x[:, 0] + size, x[:, 0] - size))
-    return np.column_stack([0.5 * (one + two), 0.5 * (one - two)[:, None] * along])
+    upper, lower = (
+        np.maximum(np.clip(eigenvalue, low, high) - eigenvalue, -high)
+        for eigenvalue in (x[:, 0] + size, x[:, 0] - size)
+    )
+    return np.column_stack([0.5 * (upper + lower), 0.5 * (upper - lower)[:, None] * along])
 
 
 def _spectral(first: Array, second: Array, along: Array, level: float) -> Array:

@@ -48,7 +48,7 @@ def recovery(mesh: SolidMesh) -> "csr_array[np.float64]":
             _weights(mesh, rule.point, spread, patches, cells, chosen[start : start + _AT_ONCE])
             for start in range(0, len(chosen), _AT_ONCE)
         ]
-    row, column, weight = (np.concatenate(one) for one in zip(*parts, strict=True))
+    row, column, weight = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     whole = coo_array((weight, (row, column)), shape=(len(mesh.nodes), rule.volume.size)).tocsr()
     count = np.bincount(patches.target, minlength=len(mesh.nodes))
     whole.data /= np.repeat(count, np.diff(whole.indptr))
@@ -119,13 +119,13 @@ def _weights(
     node = patches.target[place]
     size = (cells[chosen] @ spread).reshape(-1, 3, 3) / np.diff(cells.indptr)[chosen][:, None, None]
     corner = mesh.nodes[patches.corner[chosen]]
-    found = _fit(points.reshape(-1, 3)[number], used, size, corner, mesh.nodes[node], mesh.element.order)
+    fitted = _fit(points.reshape(-1, 3)[number], used, size, corner, mesh.nodes[node], mesh.element.order)
     used_pairs = wanted[:, :, None] & used[:, None, :]
     row, column = (
         np.broadcast_to(node[:, :, None], used_pairs.shape),
         np.broadcast_to(number[:, None, :], used_pairs.shape),
     )
-    return row[used_pairs], column[used_pairs], found[used_pairs]
+    return row[used_pairs], column[used_pairs], fitted[used_pairs]
 
 
 def _spread(mesh: SolidMesh) -> Array:
@@ -153,22 +153,22 @@ def _fit(points: Array, used: Bools, size: Array, corner: Array, target: Array, 
     """
     distance = ((points - corner[:, None]) ** 2).sum(axis=2)
     mean_square = (distance * used).sum(axis=1, keepdims=True) / used.sum(axis=1, keepdims=True)
-    part = used * (_FLAT + distance / mean_square) ** -_POWER[order]
-    part = (part / part.sum(axis=1, keepdims=True))[:, :, None]
-    mean = (part * points).sum(axis=1, keepdims=True)
+    weight = used * (_FLAT + distance / mean_square) ** -_POWER[order]
+    weight = (weight / weight.sum(axis=1, keepdims=True))[:, :, None]
+    mean = (weight * points).sum(axis=1, keepdims=True)
     local = points - mean
-    variance = local.transpose(0, 2, 1) @ (part * local)
+    variance = local.transpose(0, 2, 1) @ (weight * local)
     stretch = _inverse_root(variance + size, 0.0)
     stretch = stretch @ _inverse_root(stretch.transpose(0, 2, 1) @ variance @ stretch, _UNSEEN)
     y, z = local @ stretch, (target - mean) @ stretch
-    fitted, wanted = [part, part * y], [np.ones((*z.shape[:2], 1)), z]
+    fitted, wanted = [weight, weight * y], [np.ones((*z.shape[:2], 1)), z]
     if order == 2:
         # the part of squares and products that constant and linear polynomials do not span
         squares, aim = _squares(y), _squares(z)
-        level, slope = (part * squares).sum(axis=1, keepdims=True), fitted[1].transpose(0, 2, 1) @ squares
+        level, slope = (weight * squares).sum(axis=1, keepdims=True), fitted[1].transpose(0, 2, 1) @ squares
         rest, aim = squares - level - y @ slope, aim - level - z @ slope
-        root = _inverse_root(rest.transpose(0, 2, 1) @ (part * rest), _UNSEEN)
-        fitted.append((part * rest) @ root)
+        root = _inverse_root(rest.transpose(0, 2, 1) @ (weight * rest), _UNSEEN)
+        fitted.append((weight * rest) @ root)
         wanted.append(aim @ root)
     columns, rows = np.concatenate(fitted, axis=2).transpose(0, 2, 1), np.concatenate(wanted, axis=2)
     weights: Array = rows @ columns

@@ -52,17 +52,17 @@ def classes(keys: Sequence[Hashable], shapes: Sequence[Array], same: Callable[[i
     shapes : (nv, 3) corners of each [m]
     same : True for two shapes if they are the same
     """
-    found: dict[Hashable, list[tuple[float, int]]] = {}
+    by_key: dict[Hashable, list[tuple[float, int]]] = {}
     labels = []
     for index, shape in enumerate(shapes):
         local = shape - shape.mean(axis=0)
         spread = float(np.linalg.norm(local, axis=1).sum())  # does not depend on rotation
         slack = len(local) * _tolerance(shape)
-        candidates = found.setdefault(keys[index], [])
-        near = candidates[
+        candidates = by_key.setdefault(keys[index], [])
+        similar = candidates[
             bisect_left(candidates, (spread - slack, -1)) : bisect_left(candidates, (spread + slack, -1))
         ]
-        labels.append(next((candidate for _, candidate in near if same(candidate, index)), index))
+        labels.append(next((candidate for _, candidate in similar if same(candidate, index)), index))
         if labels[index] == index:
             insort(candidates, (spread, index))
     return labels

@@ -92,7 +92,7 @@ def check_mesh_file(path: str | Path, stones: Mapping[str, Element] | None = Non
     suffix = Path(path).suffix.lower()
     for code, element in stones.items():
         if element not in form.elements:
-            able = _listed(ending for ending, other in _FORMATS.items() if element in other.elements)
+            able = _listed(ending for ending, candidate in _FORMATS.items() if element in candidate.elements)
             raise UsageError(
                 f"{suffix} files hold no {element} cells, which stone {code} has",
                 where=where,
@@ -243,12 +243,12 @@ def _write(path: Path, form: _Format, stones: Mapping[str, VolumeMesh]) -> None:
     )
     if form.writer == "abaqus":
         whole.cell_sets = {
-            code: [np.flatnonzero(own == number) for own in number_of]
+            code: [np.flatnonzero(block == number) for block in number_of]
             for number, code in enumerate(stones, 1)
         }
     else:
         sign = -1 if form.writer == "med" else 1  # MED numbers families of cells below zero
-        whole.cell_data[form.number] = [sign * own for own in number_of]
+        whole.cell_data[form.number] = [sign * block for block in number_of]
     if form.writer == "gmsh22":
         whole.cell_data["gmsh:geometrical"] = whole.cell_data[form.number]
         whole.field_data = {code: np.array([number, 3]) for number, code in enumerate(stones, 1)}
@@ -280,7 +280,7 @@ def _for_abaqus(line: str) -> str:
     """Adapt a line for Abaqus: plain displacement elements, not hybrid ones, and no more entries than it reads."""
     entries = re.sub(r"^(\*ELEMENT, TYPE=C3D\d+)\w*", r"\1", line).split(",")
     parts = (entries[:_ABAQUS_LINE], entries[_ABAQUS_LINE:])
-    return ",\n".join(",".join(part) for part in parts if part) + "\n"
+    return ",\n".join(",".join(row) for row in parts if row) + "\n"
 
 
 def _turned(element: Element) -> list[int]:
@@ -312,7 +312,7 @@ def _sets(mesh_file: Any, form: _Format, path: Path) -> dict[str, list[Ints]]:
         codes = {number: names[0] for number, names in sorted(mesh_file.cell_tags.items(), reverse=True)}
     else:
         codes = dict(enumerate(_codes(_codes_file(path)), 1))
-    return {code: [np.flatnonzero(own == number) for own in numbers] for number, code in codes.items()}
+    return {code: [np.flatnonzero(block == number) for block in numbers] for number, code in codes.items()}
 
 
 def _codes(path: Path) -> list[str]:

@@ -138,7 +138,7 @@ def test_each_method_has_its_own_limit_and_all_together_have_one():
 
 
 @pytest.mark.parametrize(
-    ("begin", "expected"), [(Begin.GIVEN, 0.5), (Begin.AHEAD, 0.6), (Begin.NOTHING, 0.0), (Begin.BEST, 1.1)]
+    ("begin", "expected"), [(Begin.WARM, 0.5), (Begin.AHEAD, 0.6), (Begin.NOTHING, 0.0), (Begin.BEST, 1.1)]
 )
 def test_a_method_begins_where_it_is_told_to(begin, expected):
     ahead = ContactStart(0.6 * EXACT, 0.6 * EXACT)

@@ -41,9 +41,9 @@ def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[
     members: list[tuple[int, ...]] = [(corner,) for corner in used]
     number: dict[tuple[int, ...], int] = {member: k for k, member in enumerate(members)}
 
-    def point(*own: int) -> int:
+    def point(*corners: int) -> int:
         """Return the number of the mean of some corners, new where there is none yet."""
-        key = tuple(sorted(own))
+        key = tuple(sorted(corners))
         if key not in number:
             number[key] = len(members)
             members.append(key)
@@ -66,7 +66,7 @@ def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[
         face_of = {frozenset((before, after)): k for before, after, k in between[corner]}
         # edges to the corners before and after in a face and to the third form a right-handed triple
         a, b, _ = between[corner][0]
-        (c,) = {one for before, after, _ in between[corner] for one in (before, after)} - {a, b}
+        (c,) = {neighbour for before, after, _ in between[corner] for neighbour in (before, after)} - {a, b}
         ab, bc, ca = (faces[face_of[frozenset(two)]] for two in ((a, b), (b, c), (c, a)))
         rows.append(
             (

@@ -116,9 +116,9 @@ def _set_sizes(gmsh: Any, field: SizeField) -> None:
     ]
     parts = [f"{field.size!r}", *(f"{field.fine!r} + {field.growth!r}*{distance}" for distance in distances)]
     tags = []
-    for part in parts:
+    for tag in parts:
         tags.append(fields.add("MathEval"))
-        fields.setString(tags[-1], "F", part)
+        fields.setString(tags[-1], "F", tag)
     least = fields.add("Min")
     fields.setNumbers(least, "FieldsList", tags)
     fields.setAsBackgroundMesh(least)
