@@ -143,7 +143,7 @@ def confirmer(on: RigidAssembly, runs: int, **listeners: Any) -> Confirm:
 
 def leader(on: RigidAssembly, **listeners: Any) -> Lead:
     """Return what leads a mechanism to collapse by runs of the stones, all rigid."""
-    return lambda live, found, reach: pushover(on, live, found, reach, **listeners)
+    return lambda live, limit, reach: pushover(on, live, limit, reach, **listeners)
 
 
 def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
@@ -237,10 +237,10 @@ def _without_friction_across(on: RigidAssembly, live: LiveLoad, candidate: Limit
         or not slides_along_one_line(on, candidate)
     ):
         return None
-    other = without_friction_across(on, live, candidate)
-    if other is None or np.isinf(other.multiplier):
+    frictionless = without_friction_across(on, live, candidate)
+    if frictionless is None or np.isinf(frictionless.multiplier):
         return None
-    multiplier = 0.0 if np.isnan(other.multiplier) else other.multiplier
+    multiplier = 0.0 if np.isnan(frictionless.multiplier) else frictionless.multiplier
     return multiplier if multiplier < (1.0 - _SAME) * candidate.multiplier else None
 
 
@@ -355,7 +355,7 @@ def _kinematics(
         oscillator = kinematics(on, live, limit)
     except SolverError:
         return None, None
-    told = {
+    facts = {
         "blocks": int(oscillator.block.max()) + 1,
         "weight": oscillator.weight,
         "mass": oscillator.mass,
@@ -367,7 +367,7 @@ def _kinematics(
             "multiplier": oscillator.multipliers.tolist(),
         },
     }
-    return told, None if code is None else _checked(on, oscillator, *code)
+    return facts, None if code is None else _checked(on, oscillator, *code)
 
 
 def _checked(on: RigidAssembly, oscillator: Kinematics, code: str, site: Site) -> dict[str, Any]:
@@ -456,8 +456,8 @@ def _sentence(facts: dict[str, Any]) -> str:
         return f"{facts['name']}: {facts['outcome']}{_dynamics(facts)}"
     lost = "" if facts["limit_lost"] is None else f"; {facts['limit_lost']:.4g} is lost"
     how = {_CRUSHED: "candidate, as stones crush", _UNSURE: "NOT SURE, candidate or bound"}
-    held = "held" if facts["limit"] else "nothing beside the dead load is held"
-    stands = how.get(facts["limit_kind"], f"{held}{lost}")
+    limit = "held" if facts["limit"] else "nothing beside the dead load is held"
+    stands = how.get(facts["limit_kind"], f"{limit}{lost}")
     bound = "no bound" if facts["bound"] is None else f"bound {facts['bound']:.4g}"
     text = f"{facts['name']}: λ = {facts['limit']:.4g} ({stands}), {bound}{_caution(facts)}"
     across = facts["without_friction_across"]
@@ -485,12 +485,12 @@ def _dynamics(facts: dict[str, Any]) -> str:
     if "confirmation" not in facts:
         return ""
     confirmation = facts["confirmation"]
-    held = "nothing held" if confirmation["held"] is None else f"held at {confirmation['held']:.4g}"
+    load = "nothing held" if confirmation["held"] is None else f"held at {confirmation['held']:.4g}"
     lost = "nothing lost" if confirmation["lost"] is None else f"lost at {confirmation['lost']:.4g}"
-    said = ""
+    agreement = ""
     if facts["limit"] is not None:
-        said = " CONFIRMED" if confirmation["agrees"] else " NOT CONFIRMED"
-    text = f"; by the dynamics{said}: {held}, {lost}"
+        agreement = " CONFIRMED" if confirmation["agrees"] else " NOT CONFIRMED"
+    text = f"; by the dynamics{agreement}: {load}, {lost}"
     if confirmation["likeness"] is None:
         return text
     cosine = confirmation["likeness"]["cosine"]

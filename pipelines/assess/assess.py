@@ -174,7 +174,7 @@ def assess(
         groups = select_groups(scene, session, models)
         assembled = assemble_stones(scene, models, groups)
         inputs = scene_inputs(scene, assembled, groups, session)
-        known = known_stones(session, [model.record.code for model in models])
+        stones = known_stones(session, [model.record.code for model in models])
     questions = [
         _asked(question, options) for question in asked or scene_questions(scene, groups, assembled.origin)
     ]
@@ -189,21 +189,21 @@ def assess(
     if options.weakest and standing.outcome.rests:
         progress(Progress("assess", 0, len(questions), "the weakest direction"))
         questions.append(_asked(weakest_push(on), options))
-    given = digest(sorted(fingerprint(on.model.scene, on.model, on.state, models).items()))
+    inputs_digest = digest(sorted(fingerprint(on.model.scene, on.model, on.state, models).items()))
     with kept_answers(folder, UNFINISHED_ASSESSMENT, (Answer, Mechanism, Pushover)) as store:
         if len(store):
             text = f"going on, with {len(store)} answers that were found before"
             progress(Progress("assess", 0, len(questions), found=text))
         if standing.outcome.rests:
             outwards = None if assembled.wall is None else assembled.wall.outwards
-            answers = _answered(on, questions, scene.site, store, given, progress, outwards)
+            answers = _answered(on, questions, scene.site, store, inputs_digest, progress, outwards)
         else:
             answers = [fallen(on, question, standing) for question in questions]
     summary = _summary(assembled, on, answers, _unchecked(questions, options), standing, left_out)
     summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
     progress(Progress("write", 0, 1, "pictures"))
     with replacing(folder, INDEX) as fresh:
-        warnings = _write_files(fresh, scene, assembled, on, answers, known, summary)
+        warnings = _write_files(fresh, scene, assembled, on, answers, stones, summary)
     with open_database(url, create=False) as database:
         run = store_record(database, folder, _record(scene, on, answers, summary, as_of))
     progress(Progress("write", 1, 1))
@@ -225,7 +225,7 @@ def _write_files(
     assembled: Assembly,
     on: RigidAssembly,
     answers: Sequence[Answer],
-    known: Known,
+    stones: Known,
     summary: dict[str, Any],
 ) -> tuple[str, ...]:
     """Write all files of an assessment, and list them in its summary; return the requests that were not met."""
@@ -245,7 +245,7 @@ def _write_files(
         (reply.told["name"], reply.told["headline"], reply.mechanism, forces)
         for reply, forces in zip(answers, carried, strict=True)
     ]
-    model = assessment_model(scene.name, blocks, on, limits, assembled.towards, assembled.origin, known)
+    model = assessment_model(scene.name, blocks, on, limits, assembled.towards, assembled.origin, stones)
     write_assessment(folder / REPORT, summary, model)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     (folder / INDEX).write_text(as_json(summary), encoding="utf-8")
@@ -275,7 +275,7 @@ def _answered(
     questions: Sequence[Question],
     site: Site | None,
     store: Kept,
-    given: str,
+    inputs: str,
     progress: Listener,
     outwards: Array | None,
 ) -> list[Answer]:
@@ -292,7 +292,7 @@ def _answered(
     confirming, leading = confirmer(on, _RUNS, progress=within), leader(on, progress=within)
     for number, question in enumerate(questions):
         progress(Progress("assess", number, total, question.name))
-        decides = [given, digest([question, site])]
+        decides = [inputs, digest([question, site])]
         kept_answer: Answer | None = store.get(decides)
         if kept_answer is None:
             kept_answer = answer(on, question, confirming, leading, site, outwards)
@@ -353,7 +353,7 @@ def _summary(
             else []
         ),
     ]
-    loads = [one.told for one in answers]
+    loads = [solved.told for solved in answers]
     return {
         "scene": assembled.scene.name,
         "stones": len(on.model.mass),
@@ -432,12 +432,12 @@ def _limit(load: dict[str, Any]) -> float:
     if load.get("outcome") == FALLS:
         return 0.0
     runs = load.get("confirmation", {})
-    known = [
+    limits = [
         load.get("limit", load.get("candidate")),
         load.get("bound"),
         runs.get("held") or runs.get("lost"),
     ]
-    return min((value for value in known if value is not None), default=float("inf"))
+    return min((value for value in limits if value is not None), default=float("inf"))
 
 
 def _carried(on: RigidAssembly, given_answer: Answer) -> Resultants | None:
@@ -480,13 +480,13 @@ def _write_forces(
 def _write_curves(folder: Path, answers: Sequence[Answer], titles: Sequence[str]) -> list[str]:
     """Write each capacity curve as a table and a picture; return file names."""
     names = []
-    for number, (one, title) in enumerate(zip(answers, titles, strict=True), start=1):
-        if one.curve is None:
+    for number, (solved, title) in enumerate(zip(answers, titles, strict=True), start=1):
+        if solved.curve is None:
             continue
-        columns = np.column_stack([one.curve.displacement, one.curve.multiplier, one.curve.inertia])
+        columns = np.column_stack([solved.curve.displacement, solved.curve.multiplier, solved.curve.inertia])
         table, picture = f"pushover-{number}.csv", f"pushover-{number}.png"
         np.savetxt(folder / table, columns, "%.7g", ",", header=",".join(CURVE_COLUMNS), comments="")
-        draw_capacity(folder / picture, title, one.curve, one.told["bound"])
+        draw_capacity(folder / picture, title, solved.curve, solved.told["bound"])
         names += [table, picture]
     return names
 
@@ -503,14 +503,14 @@ def _record(
         versions=versions(),
         results=(),
         as_of=as_of,
-        mechanisms={one.told["name"]: _moving(on, one) for one in answers},
+        mechanisms={solved.told["name"]: _moving(on, solved) for solved in answers},
     )
 
 
 def _moving(on: RigidAssembly, solved: Answer) -> tuple[MovingStone, ...]:
     speed = {
-        block.code: float(one)
-        for block, one in zip(on.model.scene.blocks, solved.mechanism.speed, strict=True)
+        block.code: float(pace)
+        for block, pace in zip(on.model.scene.blocks, solved.mechanism.speed, strict=True)
     }
     return tuple(
         MovingStone(stone["code"], speed[stone["code"]], tuple(stone["velocity"]), tuple(stone["spin"]))

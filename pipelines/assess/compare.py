@@ -116,7 +116,7 @@ def compare(
         with database.session(read_only=True) as session:
             as_of, models = latest_entry(session), select_stones(scene, session)
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
-            assembly, inputs, known = _assembled(scene, models, session)
+            assembly, inputs, surveyed = _assembled(scene, models, session)
         built = build_model(assembly.scene, lambda done, total: progress(Progress("mesh", done, total)))
         if not accept_unsound:
             refuse_unsound(problems_of(scene, assembly, loose_blocks(*built)), str(path))
@@ -130,12 +130,14 @@ def compare(
         summary["inputs"] = {title: list(lines) for title, lines in inputs.items()}
         values, lines = _values(courses, plumb), _lines(courses, facades, assembly.origin)
         results = tuple(_with_values(stone, values.get(stone.code, {})) for stone in stone_results(result))
-        model = run_model(result, results, assembly.towards, assembly.origin, known, lines, structures)
+        model = run_model(result, results, assembly.towards, assembly.origin, surveyed, lines, structures)
         with replacing(folder, INDEX) as fresh:
             _draw(fresh, facades, stones, courses)
             _write(fresh, scene, summary, model)
-        kept = summarise(result, version=versions()["moma"], seconds=result.wall_time, structures=structures)
-        run = store_record(database, folder, run_record(result, results, scene, assembly, kept, as_of))
+        stored = summarise(
+            result, version=versions()["moma"], seconds=result.wall_time, structures=structures
+        )
+        run = store_record(database, folder, run_record(result, results, scene, assembly, stored, as_of))
     progress(Progress("write", 1, 1))
     return SurveyComparison(folder, summary, run)
 
@@ -224,7 +226,7 @@ def _summary(
         {"facade": wall.facade, "zone": wall.zone, "quantity": "plumb", **_told(wall.misfit)}
         for wall in plumb
     ]
-    whole = _sum([*(misfit_of.misfit for misfit_of in courses), *(one.misfit for one in plumb)])
+    whole = _sum([*(misfit_of.misfit for misfit_of in courses), *(movement.misfit for movement in plumb)])
     leaning = {(wall.facade, wall.zone): wall.courses for wall in plumb}
     return {
         "scene": result.scene.name,

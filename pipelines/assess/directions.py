@@ -23,7 +23,7 @@ _AXES = {0.0: "x", 90.0: "y", 180.0: "-x", 270.0: "-y"}
 
 def push(angle: float) -> LoadQuestion:
     """Return the question of a horizontal push at an angle from x towards y [°]."""
-    axis = min(_AXES, key=lambda one: abs((angle - one + 180.0) % 360.0 - 180.0))
+    axis = min(_AXES, key=lambda candidate: abs((angle - candidate + 180.0) % 360.0 - 180.0))
     if abs((angle - axis + 180.0) % 360.0 - 180.0) <= _AXIS_ANGLE:
         x, y = round(np.cos(np.radians(axis))), round(np.sin(np.radians(axis)))
         return LoadQuestion(f"horizontal {_AXES[axis]}", Acceleration((float(x), float(y), 0.0)))
@@ -39,18 +39,18 @@ def facade_pushes(blocks: Sequence[Block]) -> tuple[LoadQuestion, ...]:
     The façades are the directions that most upright faces of the stones share, up to a right angle.
     """
     area, angle = _upright([block for block in blocks if block.fidelity is not Fidelity.FIXED])
-    turns, left = list[float](), np.ones(len(area), dtype=bool)
-    while left.any():
+    turns, remaining = list[float](), np.ones(len(area), dtype=bool)
+    while remaining.any():
         # angles count four times: faces at right angles are of one façade or of those beside it
-        alike = np.abs(np.angle(np.exp(4j * (angle[:, None] - angle[left])))) <= 4.0 * _ALIKE
-        weight = (area * left) @ alike
+        alike = np.abs(np.angle(np.exp(4j * (angle[:, None] - angle[remaining])))) <= 4.0 * _ALIKE
+        weight = (area * remaining) @ alike
         peak = int(weight.argmax())
         if weight[peak] < _PUSH_SHARE * area.sum():
             break
-        facing = alike[:, peak] & left
+        facing = alike[:, peak] & remaining
         turn = float(np.degrees(np.angle(area[facing] @ np.exp(4j * angle[facing])) / 4.0))
         turns.append(round(turn, 6) % 90.0)
-        left &= ~facing
+        remaining &= ~facing
     sides = (0.0, 180.0, 90.0, 270.0)
     return tuple(push(turn + side) for turn in turns or [0.0] for side in sides)
 

@@ -109,9 +109,9 @@ class Checkpoints:
         histories = list(self._histories)
         if store.rows:
             grown = _Store({})
-            part = {name: grown.rows_of(rows, name) for name, rows in store.rows.items()}
+            content = {name: grown.rows_of(rows, name) for name, rows in store.rows.items()}
             name = f"history-{step:08d}.h5"
-            histories.append([name, write_whole(self._folder / name, _image(part, grown.arrays))])
+            histories.append([name, write_whole(self._folder / name, _image(content, grown.arrays))])
         whole = {"step": step, "notes": dict(notes), "carried": values, "histories": histories}
         name = f"checkpoint-{step:08d}.h5"
         write_whole(self._folder / name, _image(whole, store.arrays))
@@ -136,8 +136,8 @@ class Checkpoints:
         values, arrays = _contents(self._folder / name)
         rows: dict[str, Rows[Any]] = {}
         for history, checksum in values["histories"]:
-            part, columns = _contents(self._folder / history, checksum)
-            for key, content in part.items():
+            loaded, columns = _contents(self._folder / history, checksum)
+            for key, content in loaded.items():
                 rows.setdefault(key, Rows()).extend(_revived_rows(content, columns))
         carried = _revived(values["carried"], arrays, rows)
         self._kept, self._histories = [name], values["histories"]

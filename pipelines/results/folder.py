@@ -101,8 +101,8 @@ def check_replaceable(folder: Path, index: str = RUN_INDEX, source: Sequence[Pat
         raise UsageError(f"holds files that no run of MOMA wrote ({shown})", where=place, remedy=remedy)
     if files_by_index[RUN_INDEX] and index != RUN_INDEX:
         raise UsageError("holds the results of a run", where=place, remedy=remedy)
-    for left, (index_name, what) in _UNFINISHED_RUNS.items():
-        if index != index_name and (folder / left).exists():
+    for unfinished, (index_name, what) in _UNFINISHED_RUNS.items():
+        if index != index_name and (folder / unfinished).exists():
             raise UsageError(f"holds an unfinished {what}", where=place, remedy=remedy)
     if source and (earlier := _source(folder)) not in (None, source_of(source, folder)):
         there = " and ".join(os.path.normpath(folder / name) for name in earlier or ())
@@ -197,19 +197,19 @@ def _put(fresh: Path, target: Path) -> None:
             shutil.rmtree(earlier)
 
 
-def _exchanged(path: Path, other: Path) -> bool:
+def _exchanged(path: Path, target: Path) -> bool:
     """Exchange two names at once; return False where the system cannot."""
     if not sys.platform.startswith("linux"):
         return False
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     if rename is None:
         return False
-    if rename(_HERE, os.fsencode(path), _HERE, os.fsencode(other), _EXCHANGE) == 0:
+    if rename(_HERE, os.fsencode(path), _HERE, os.fsencode(target), _EXCHANGE) == 0:
         return True
     number = ctypes.get_errno()
     if number in _CANNOT:
         return False
-    raise OSError(number, os.strerror(number), str(other))
+    raise OSError(number, os.strerror(number), str(target))
 
 
 def _recover(folder: Path) -> None:
@@ -227,10 +227,10 @@ def _recover(folder: Path) -> None:
 
 def _clean(parent: Path) -> None:
     """Remove the hidden folders of programs that have ended before they were done."""
-    for left in parent.glob(f".*{_MARK}{_RANDOM}"):
-        handle = _lock(left)
+    for hidden in parent.glob(f".*{_MARK}{_RANDOM}"):
+        handle = _lock(hidden)
         if handle is not None:
-            shutil.rmtree(left, ignore_errors=True)
+            shutil.rmtree(hidden, ignore_errors=True)
             os.close(handle)
 
 

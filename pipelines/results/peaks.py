@@ -33,15 +33,15 @@ def peak_records(result: Result) -> dict[str, dict[str, Any] | None]:
     if peaks is None:
         return dict.fromkeys(quantities_of("peak"))
     codes, last = [body.code for body in result.bodies], _at_end(result, peaks)
-    found: dict[str, dict[str, Any] | None] = {}
+    records: dict[str, dict[str, Any] | None] = {}
     for name in quantities_of("peak"):
         if name in ("reaction", "shear"):
-            one = getattr(peaks, name)
-            found[name] = _peak(name, one.value, one.time, one.end, [])
+            peak = getattr(peaks, name)
+            records[name] = _peak(name, peak.value, peak.time, peak.end, [])
         else:
             record = getattr(peaks, "relative" if name == "relative_displacement" else name)
-            found[name] = _largest(name, record, codes, last[name])
-    return found
+            records[name] = _largest(name, record, codes, last[name])
+    return records
 
 
 def _peak(name: str, value: float, time: float, end: float, stones: list[str]) -> dict[str, Any]:
@@ -56,12 +56,12 @@ def _peak(name: str, value: float, time: float, end: float, stones: list[str]) -
 
 def _largest(name: str, largest: Largest, codes: Sequence[str], end: float) -> dict[str, Any] | None:
     """Return the largest value of all bodies; None where none is known."""
-    known = np.isfinite(largest.value)
-    if not known.any():
+    finite = np.isfinite(largest.value)
+    if not finite.any():
         return None
-    body = int(np.where(known, largest.value, -np.inf).argmax())
+    body = int(np.where(finite, largest.value, -np.inf).argmax())
     value, partner = float(largest.value[body]), int(largest.partner[body])
-    stones = [codes[one] for one in sorted((body, partner)) if one >= 0] if value > 0.0 else []
+    stones = [codes[number] for number in sorted((body, partner)) if number >= 0] if value > 0.0 else []
     return _peak(name, value, float(largest.time[body]), end, stones)
 
 
@@ -69,9 +69,9 @@ def _at_end(result: Result, peaks: Peaks) -> dict[str, float]:
     joints = result.joints
     values = [body.values for body in result.bodies if body.values is not None]
     moves = np.array([body.fidelity is not Fidelity.FIXED for body in result.bodies])
-    way = np.array([np.linalg.norm(body.displacement, axis=1).max() for body in result.bodies])
+    path = np.array([np.linalg.norm(body.displacement, axis=1).max() for body in result.bodies])
     return {
-        "displacement": _most(way, moves),
+        "displacement": _most(path, moves),
         "relative_displacement": _most(peaks.relative_end, np.isfinite(peaks.relative_end)),
         "opening": float(joints.opening.max(initial=0.0)),
         "sliding": float(joints.sliding.max(initial=0.0)),
@@ -94,14 +94,14 @@ def rocking_stones(result: Result) -> list[str]:
     last = np.full(len(result.bodies), np.inf)  # a stone that has left all others does not rock
     last[np.unique(result.joints.bodies)] = 0.0
     np.maximum.at(last, result.joints.bodies.ravel(), np.repeat(result.joints.opening, 2))
-    found = []
+    rocking = []
     for number, block in enumerate(result.scene.blocks):
         most = float(result.peaks.opening.value[number])
         lifted = most > _LIFTED * float(np.ptp(block.vertices, axis=0).min())
         back = moving or last[number] < _CLOSED * most
         if block.fidelity is not Fidelity.FIXED and lifted and back:
-            found.append(block.code)
-    return found
+            rocking.append(block.code)
+    return rocking
 
 
 def realisations(result: Result) -> list[dict[str, Any]]:
@@ -127,11 +127,11 @@ def rocking_caution(result: Result) -> str:
     stones = rocking_stones(result)
     if not stones and result.repeated is None:
         return ""
-    said = "no stone rocks, and the run was repeated at half the step"
+    text = "no stone rocks, and the run was repeated at half the step"
     if stones:
-        said = f"{len(stones)} stones rock, e.g. {stones[0]}: their peaks are one realisation of a chaotic motion"
+        text = f"{len(stones)} stones rock, e.g. {stones[0]}: their peaks are one realisation of a chaotic motion"
     if result.repeated is None:
-        return f"{said}, and another step gives others; moma run --repeat-half-step tells how far apart"
+        return f"{text}, and another step gives others; moma run --repeat-half-step tells how far apart"
     first, second = realisations(result)
     units = {"m": (1e3, "mm"), "N": (1e-3, "kN")}
     parts = []
@@ -139,8 +139,8 @@ def rocking_caution(result: Result) -> str:
         if name in first["peaks"] and name in second["peaks"]:
             peak = quantities_of("peak")[name]
             factor, unit = units[str(peak.unit)]
-            values = (f"{factor * one['peaks'][name]:.3g}" for one in (first, second))
+            values = (f"{factor * record['peaks'][name]:.3g}" for record in (first, second))
             parts.append(f"{peak.label.lower()} {' and '.join(values)} {unit}")
-    steps = " and ".join(f"{1e3 * one['step']:.3g}" for one in (first, second))
-    other = "" if first["outcome"] == second["outcome"] else f"the second run is {second['outcome']}; "
-    return f"{said}; with steps of {steps} ms: {other}{', '.join(parts)}"
+    steps = " and ".join(f"{1e3 * record['step']:.3g}" for record in (first, second))
+    outcome = "" if first["outcome"] == second["outcome"] else f"the second run is {second['outcome']}; "
+    return f"{text}; with steps of {steps} ms: {outcome}{', '.join(parts)}"

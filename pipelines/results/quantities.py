@@ -260,7 +260,7 @@ def _field_apart(
     )
     volume = np.array([reference.volume for _, reference in pairs])
     apart, scale = (
-        float(np.sqrt(np.average((one**2).sum(axis=1), weights=volume))) for one in (values - true, true)
+        float(np.sqrt(np.average((field**2).sum(axis=1), weights=volume))) for field in (values - true, true)
     )
     scale = max(scale, least)
     return apart / scale if scale > 0.0 else None

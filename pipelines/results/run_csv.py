@@ -88,11 +88,13 @@ def write_series(folder: Path, result: Result, origin: Array) -> None:
     ).reshape(steps * count, -1)
     named = codes[np.tile(series.body, steps)]
     _write(folder, "series_stones.csv", np.repeat(series.time, count), zip(named, strict=True), stones)
-    own = series.joints
-    joints = np.stack([own.opening, own.sliding, own.normal, own.shear], axis=2).reshape(-1, 4)
-    number = np.tile(own.joint, steps)
+    histories = series.joints
+    joints = np.stack(
+        [histories.opening, histories.sliding, histories.normal, histories.shear], axis=2
+    ).reshape(-1, 4)
+    number = np.tile(histories.joint, steps)
     pair = zip(number, *codes[result.joints.bodies[number]].T, strict=True)
-    _write(folder, "series_joints.csv", np.repeat(series.time, len(own.joint)), pair, joints)
+    _write(folder, "series_joints.csv", np.repeat(series.time, len(histories.joint)), pair, joints)
 
 
 def _write(folder: Path, name: str, time: Array, named: Iterable[Sequence[object]], values: Array) -> None:

@@ -100,7 +100,7 @@ def stone_results(result: Result) -> tuple[StoneResult, ...]:
             von_mises_mean=None if body.values is None else body.values.von_mises_mean,
             displacement_max=float(np.linalg.norm(body.displacement, axis=1).max()),
             contact_force_max=None if np.isnan(largest[number]) else float(largest[number]),
-            values=_values(body, {name: float(one[number]) for name, one in further.items()}),
+            values=_values(body, {name: float(values[number]) for name, values in further.items()}),
         )
         for number, body in enumerate(result.bodies)
     )
@@ -149,7 +149,7 @@ def _peak_values(peaks: Peaks | None) -> dict[str, Array]:
 def _largest(bodies: Ints, values: Array, count: int) -> Array:
     """Return the largest value (n,) over the pairs of bodies (n, 2) that each body (count,) is in; NaN without one."""
     largest = np.full(count, -np.inf)
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     for side in (0, 1):
-        np.maximum.at(largest, bodies[known, side], values[known])
+        np.maximum.at(largest, bodies[finite, side], values[finite])
     return np.where(np.isfinite(largest), largest, np.nan)

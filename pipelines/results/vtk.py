@@ -163,10 +163,10 @@ def _stresses(blocks: Sequence[Block], frame: Frame) -> dict[str, Array]:
             for place, stress in zip(frame.positions, frame.stresses, strict=True)
         ]
     )
-    known = np.isfinite(stress[:, 0])
+    stressed = np.isfinite(stress[:, 0])
     values, first, third = (np.full((len(stress), 3), np.nan) for _ in range(3))
-    values[known], directions = principal(stress[known])
-    first[known], third[known] = directions[:, 0], directions[:, 2]
+    values[stressed], directions = principal(stress[stressed])
+    first[stressed], third[stressed] = directions[:, 0], directions[:, 2]
     used, start = np.full(len(stress), np.nan), 0
     for block, place in zip(blocks, frame.positions, strict=True):
         rows = slice(start, start := start + len(place))
@@ -201,15 +201,15 @@ def contact_grid(contacts: ContactResult) -> UnstructuredGrid:
 
 def status_numbers(contacts: ContactResult) -> Ints:
     """Return the number of the status of each contact point in the files (nc,)."""
-    return np.array([STATUSES.index(str(one)) for one in contacts.status], dtype=np.int64)
+    return np.array([STATUSES.index(str(status)) for status in contacts.status], dtype=np.int64)
 
 
 def joint_grid(joints: JointResult) -> UnstructuredGrid:
     """Make the grid of the joints' polygons, with the values of `JointResult`."""
     # where faces no longer overlap, the polygon shrinks to a point
     polygons = [
-        one if len(one) > 2 else np.tile(centre, (3, 1))
-        for one, centre in zip(joints.polygon, joints.centroid, strict=True)
+        polygon if len(polygon) > 2 else np.tile(centre, (3, 1))
+        for polygon, centre in zip(joints.polygon, joints.centroid, strict=True)
     ]
     sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
     ends = np.cumsum(sizes)

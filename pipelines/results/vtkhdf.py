@@ -161,7 +161,7 @@ class _Writer:
             total = (
                 None
                 if self._parts is None
-                else sum(len(part[self._name(group)].arrays[name]) for part in self._parts)
+                else sum(len(blocks[self._name(group)].arrays[name]) for blocks in self._parts)
             )
             self._make(group, name, like, total, _CHUNK)
         count = None if self._parts is None else len(self._parts)
@@ -193,7 +193,9 @@ class _Writer:
         return str(group.name).rpartition("/")[2]
 
     def _most(self, group: Any) -> int | None:
-        return None if self._parts is None else max(part[self._name(group)].points for part in self._parts)
+        return (
+            None if self._parts is None else max(blocks[self._name(group)].points for blocks in self._parts)
+        )
 
     def _make(
         self, group: Any, name: str, like: NDArray[Any], total: int | None, least: int | None = None
@@ -208,18 +210,18 @@ class _Writer:
 
     def add(self, instant: float, parts: Mapping[str, _Part]) -> None:
         """Add a frame; its number is written last."""
-        for name, part in parts.items():
-            self._add(self._file[f"{_ROOT}/{name}"], instant, part, isinstance(self._blocks[name], _Stones))
+        for name, block in parts.items():
+            self._add(self._file[f"{_ROOT}/{name}"], instant, block, isinstance(self._blocks[name], _Stones))
 
-    def _add(self, group: Any, instant: float, part: _Part, shared: bool) -> None:
+    def _add(self, group: Any, instant: float, block: _Part, shared: bool) -> None:
         steps = group["Steps"]
         count = int(steps.attrs["NSteps"])
-        at = {name: self._append(group, name, values) for name, values in part.arrays.items()}
+        at = {name: self._append(group, name, values) for name, values in block.arrays.items()}
         if not shared:
-            for name, number in zip(_PER_FRAME, (part.points, part.cells, part.ids), strict=True):
+            for name, number in zip(_PER_FRAME, (block.points, block.cells, block.ids), strict=True):
                 self._append(group, name, np.array([number]))
-            if (points_before := self._data(group, "Connectivity")[1]) < part.points:
-                self._append(group, "Connectivity", np.arange(points_before, part.points, dtype=np.int32))
+            if (points_before := self._data(group, "Connectivity")[1]) < block.points:
+                self._append(group, "Connectivity", np.arange(points_before, block.points, dtype=np.int32))
         offsets: dict[str, float] = {
             "Values": instant,
             "PartOffsets": 0 if shared else count,
@@ -228,7 +230,7 @@ class _Writer:
             "CellOffsets": 0 if shared else at["Types"],
             "ConnectivityIdOffsets": 0,
             _NOUGHT: 0,
-            _AT_CELL: count * part.cells if shared else 0,
+            _AT_CELL: count * block.cells if shared else 0,
         }
         for name, value in offsets.items():
             shape = (1, 1) if name in ("CellOffsets", "ConnectivityIdOffsets") else (1,)
@@ -293,15 +295,17 @@ def _add(
     import h5py
 
     new = [_parts_of(blocks, frame) for frame in frames] if parts is None else parts
-    size = sum(array.nbytes for part in new for block in part.values() for array in block.arrays.values())
+    size = sum(
+        array.nbytes for written in new for block in written.values() for array in block.arrays.values()
+    )
     least = sum(max(array.nbytes, _CHUNK) for block in new[-1].values() for array in block.arrays.values())
     with path.open("r+b") as room:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(room.fileno(), 0, path.stat().st_size + 2 * (size + least) + _ROOM)
     with h5py.File(path, "r+", libver=_HEADERS, locking=False) as file:
         writer = _Writer(file, blocks, parts)
-        for frame, part in zip(frames, new, strict=True):
-            writer.add(frame.time, part)
+        for frame, written in zip(frames, new, strict=True):
+            writer.add(frame.time, written)
 
 
 def write_vtkhdf(

@@ -155,7 +155,7 @@ def _array(name: str, values: NDArray[np.generic], unit: str | None = None) -> s
     content = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     block = zlib.compress(content, _LEVEL)
     sizes = struct.pack("<4Q", 1, len(content), 0, len(block)) if content else struct.pack("<3Q", 0, 0, 0)
-    encoded = "".join(base64.b64encode(part).decode("ascii") for part in (sizes, block if content else b""))
+    encoded = "".join(base64.b64encode(piece).decode("ascii") for piece in (sizes, block if content else b""))
     shape = f' NumberOfComponents="{components}"' if components > 1 else ""
     label = ""
     if unit is not None:

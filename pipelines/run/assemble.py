@@ -188,7 +188,7 @@ def _scene(
     materials = {block.code: block.material.name for block in blocks}
     loads = [_entry_about(entry, origin) for entry in scene.loads if not scene.stages]
     velocity = thrown(document, scene.throws, groups, by_code)
-    thickness = {stones: own for leaf in closing.leaves for stones, own in leaf.thickness.items()}
+    thickness = {stones: width for leaf in closing.leaves for stones, width in leaf.thickness.items()}
     rules = law_rules(document, scene.laws, groups, materials, thickness)
     return Scene(
         name=scene.name,
@@ -223,7 +223,7 @@ def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones
         for block in whole.blocks
         if block.code in stones.standing
     )
-    own = {path: tuple(codes & stones.standing for codes in of) for path, of in groups.items()}
+    standing = {path: tuple(codes & stones.standing for codes in of) for path, of in groups.items()}
     acting = [_entry_about(load, origin) for load in scene.loads if stones.name in load.values["stages"]]
     rules = (
         LawRule(rule.first & stones.standing, rule.second & stones.standing, rule.law)
@@ -233,7 +233,7 @@ def _stage(scene: SceneFile, whole: Scene, groups: Groups, origin: Array, stones
         whole,
         blocks=blocks,
         contact=replace(whole.contact, rules=tuple(rule for rule in rules if rule.first and rule.second)),
-        loads=build_loads(scene.document, acting, own, {block.code: block for block in blocks}),
+        loads=build_loads(scene.document, acting, standing, {block.code: block for block in blocks}),
         series=tuple(code for code in whole.series if code in stones.standing),
     )
 
@@ -242,11 +242,11 @@ def _meshes(scene: SceneFile, groups: Groups) -> dict[str, MeshSettings]:
     """Return the meshes of the stones that [[meshes]] name; of two for the same stone, the later holds."""
     meshes: dict[str, MeshSettings] = {}
     for entry in scene.meshes:
-        given = {key: value for key, value in entry.values.items() if value is not None}
-        own = typed_values(MeshSettings, given)
-        if "size" in own:
-            own["ring_size"] = own["size"]  # the size given for a stone holds in a ring too
-        meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **own))
+        stated = {key: value for key, value in entry.values.items() if value is not None}
+        settings = typed_values(MeshSettings, stated)
+        if "size" in settings:
+            settings["ring_size"] = settings["size"]  # the size given for a stone holds in a ring too
+        meshes |= dict.fromkeys(groups[entry.path][0], replace(scene.mesh, **settings))
     return meshes
 
 
@@ -270,7 +270,7 @@ def _block(model: StoneModel, chosen: Modelled, solid: Solid, mesh: MeshSettings
 def convex_parts_of(solid: Solid) -> tuple[Part, ...]:
     """Return the convex parts of a stone that is not convex."""
     parts = stone_parts(solid)
-    return tuple(Part(part.vertices, part.faces) for part in parts) if len(parts) > 1 else ()
+    return tuple(Part(piece.vertices, piece.faces) for piece in parts) if len(parts) > 1 else ()
 
 
 def _facing(stones: Sequence[SurveyedBlock]) -> Array:

@@ -160,7 +160,7 @@ def _shapes(scene: str, assembly: Assembly) -> ClosingShapes:
                 Solid(record.code, record.solid_vertices - assembly.origin, record.solid_faces)
                 for record in records
             ],
-            simple=[one.solid for one in assembly.simplified],
+            simple=[stone.solid for stone in assembly.simplified],
             closed=[Solid(block.code, block.vertices, block.faces) for block in assembly.scene.blocks],
         ),
         simplified={stone.code: stone.report.displacement for stone in assembly.simplified},
@@ -182,13 +182,13 @@ def _report(
     """Return the report; it says less where stones could not be assembled, or the scene not be meshed."""
     kinds = Counter(model.record.kind for model in models)
     chosen = _modelled(scene, models, groups) if assembly is None else assembly.modelled
-    bodies = Counter(str(one.fidelity) for one in chosen.values())
+    bodies = Counter(str(model.fidelity) for model in chosen.values())
     uses = Counter(model.material for model in models)
     return CheckReport(
         scene=scene.name,
         kinds=dict(sorted(kinds.items())),
         bodies={str(fidelity): bodies[str(fidelity)] for fidelity in Fidelity},
-        ring=sum(one.ring > 0 for one in chosen.values()),
+        ring=sum(model.ring > 0 for model in chosen.values()),
         stones=tuple(
             StoneModelling(code, str(choice.fidelity), choice.reason, choice.stress)
             for code, choice in chosen.items()

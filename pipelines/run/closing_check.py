@@ -163,7 +163,7 @@ def simplification_report(stones: Sequence[BlockyStone]) -> SimplificationReport
         blockiness=least.report.blockiness,
         max_displacement=moved[worst],
         worst_stone=worst,
-        outside=tuple(sorted(outside, key=lambda one: -one.displacement)),
+        outside=tuple(sorted(outside, key=lambda stone: -stone.displacement)),
         general={stone.code: stone.report.reason for stone in stones if str(stone.shape) == "polyhedron"},
         displacement=moved,
     )
@@ -178,17 +178,17 @@ def joints_report(
     """
     closed = [joint for joint in closing.joints if not joint.left_open]
     areas = np.array([joint.area for joint in closing.joints])
-    moved = {code: float(one.max(initial=0.0)) for code, one in closing.displacement.items()}
+    moved = {code: float(distance.max(initial=0.0)) for code, distance in closing.displacement.items()}
     worst = max(moved, key=lambda code: moved[code], default=None)
     open_for = Counter(joint.left_open for joint in closing.joints if joint.left_open)
     return JointsReport(
         mode=str(closing.mode),
         count=len(closed),
-        planes=len({one.plane for one in closed}),
+        planes=len({joint.plane for joint in closed}),
         mean_width=float(np.average([joint.width for joint in closing.joints], weights=areas))
         if areas.any()
         else 0.0,
-        area=sum(one.area for one in closed),
+        area=sum(joint.area for joint in closed),
         left_open=dict(open_for.most_common()),
         max_displacement=0.0 if worst is None else moved[worst],
         worst_stone=worst,
@@ -199,7 +199,7 @@ def joints_report(
             GapPlace(
                 joint.stones, joint.width, joint.area, _place(joint.centroid + origin), "closed half-way"
             )
-            for joint in sorted(closed, key=lambda one: one.width)
+            for joint in sorted(closed, key=lambda joint: joint.width)
             if joint.width < -_DEEP and not hypotheses & set(joint.stones)
         ),
         gaps=tuple(

@@ -117,11 +117,11 @@ def _others(
     codes: Sequence[str], chosen: Mapping[str, Modelled], neighbours: Neighbours, wishes: Wishes
 ) -> dict[str, Modelled]:
     """Model stones whose stress is not needed: deformable within the ring, rigid outside it."""
-    held = {code for code, model in chosen.items() if model.fidelity is Fidelity.FIXED}
+    fixed = {code for code, model in chosen.items() if model.fidelity is Fidelity.FIXED}
     region = [
         code for code in codes if code in (wishes.stress or ()) and _stressed(code, chosen[code], wishes)
     ]
-    within = _within(region, neighbours, wishes.ring, held)
+    within = _within(region, neighbours, wishes.ring, fixed)
     others: dict[str, Modelled] = {}
     for code in codes:
         if code in chosen:
@@ -138,7 +138,7 @@ def _others(
 
 
 def _within(
-    region: Sequence[str], neighbours: Neighbours, reach: int, held: Set[str]
+    region: Sequence[str], neighbours: Neighbours, reach: int, fixed: Set[str]
 ) -> dict[str, tuple[int, str]]:
     """Return stones within `reach` joints of a region: the distance and the nearest stone, the first of several.
 
@@ -152,7 +152,7 @@ def _within(
         if distance == reach:
             continue
         for neighbour in sorted(neighbours.get(code, ())):
-            if neighbour not in reached and neighbour not in held:
+            if neighbour not in reached and neighbour not in fixed:
                 reached[neighbour] = distance + 1, nearest
                 waiting.append(neighbour)
     return reached

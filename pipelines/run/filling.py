@@ -104,7 +104,7 @@ class LeafReport:
             f"{1e3 * self.thickest:.1f} mm; stones grew by {1e3 * self.growth:.1f} mm at most (stone {self.farthest})",
         ]
         if self.crossing:
-            pairs = ", ".join(" and ".join(one) for one in self.crossing[:_NAMED])
+            pairs = ", ".join(" and ".join(pair) for pair in self.crossing[:_NAMED])
             more = ", …" if len(self.crossing) > _NAMED else ""
             lines.append(
                 f"{len(self.crossing)} pairs of outlines touch or cross: {pairs}{more}; look at them"
@@ -117,7 +117,7 @@ class LeafReport:
         if len(self.openings) > _NAMED:
             rest = self.openings[_NAMED:]
             lines.append(
-                f"{len(rest)} more openings, {sum(one.area for one in rest):.3g} m² in all, stay open"
+                f"{len(rest)} more openings, {sum(opening.area for opening in rest):.3g} m² in all, stay open"
             )
         if self.pockets:
             area = sum(pocket.area for pocket in self.pockets)

@@ -46,7 +46,7 @@ def scene_inputs(
         "Contact": tuple(_laws(scene, built, groups)),
         "Supports": tuple(block.code for block in built.blocks if block.fidelity is Fidelity.FIXED),
         "Loads": (
-            f"gravity ({', '.join(f'{one:z.4g}' for one in built.gravity)}) m/s²",
+            f"gravity ({', '.join(f'{component:z.4g}' for component in built.gravity)}) m/s²",
             *(describe(entry, groups) for entry in (*scene.loads, *scene.throws)),
         ),
         "Stages": stage_lines(scene, assembly),
@@ -72,22 +72,22 @@ def run_inputs(
 def stage_lines(scene: SceneFile, assembly: Assembly) -> tuple[str, ...]:
     """Describe the stages of building: how many stones stand in each and are held, and the loads that act in it."""
     lines = []
-    own = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
+    fixed = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
     for stage in assembly.stages:
         blocks = stage.scene.blocks
-        held = sum(block.fidelity is Fidelity.FIXED and block.code not in own for block in blocks)
+        supports = sum(block.fidelity is Fidelity.FIXED and block.code not in fixed for block in blocks)
         acting = [load.type for load in scene.loads if stage.name in load.values["stages"]]
-        said = [f"{len(blocks)} stones", *([f"{held} held"] if held else []), *acting]
-        lines.append(f"{stage.name}: {', '.join(said)}")
+        facts = [f"{len(blocks)} stones", *([f"{supports} held"] if supports else []), *acting]
+        lines.append(f"{stage.name}: {', '.join(facts)}")
     return tuple(lines)
 
 
 def closing_lines(report: JointsReport) -> tuple[str, ...]:
     """Describe how the joints were closed, and what is left of gaps and overlaps."""
-    left = sum(report.left_open.values())
+    open_count = sum(report.left_open.values())
     lines = [
-        f"{report.mode}: {report.count} closed, {left} left open; {1e3 * report.mean_width:z.1f} mm wide on average "
-        "as surveyed"
+        f"{report.mode}: {report.count} closed, {open_count} left open; {1e3 * report.mean_width:z.1f} mm wide on "
+        "average as surveyed"
     ]
     if report.worst_stone is not None and report.max_displacement > 0.0:
         lines.append(
@@ -124,25 +124,27 @@ def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
     sources: dict[str, list[StoneRecord]] = {}
     for model in models:
         sources.setdefault(model.record.depth_source, []).append(model.record)
-    for source, records in sorted(sources.items(), key=lambda one: -len(one[1]))[:_MAX_NAMED]:
+    for source, records in sorted(sources.items(), key=lambda item: -len(item[1]))[:_MAX_NAMED]:
         depths = [record.depth for record in records]
         least, most = (f"{value:.3g}" for value in (min(depths), max(depths)))
         span = least if least == most else f"{least} to {most}"
         sigmas = [record.depth_sigma for record in records if record.depth_sigma is not None]
-        known = f"σ up to {1e3 * max(sigmas):.2g} mm" if sigmas else "taken as certain"
-        yield f"{source or 'source not stated'}, {len(records)} stones: {span} m, {known}"
+        uncertainty = f"σ up to {1e3 * max(sigmas):.2g} mm" if sigmas else "taken as certain"
+        yield f"{source or 'source not stated'}, {len(records)} stones: {span} m, {uncertainty}"
     if len(sources) > _MAX_NAMED:
         yield f"and {len(sources) - _MAX_NAMED} more sources"
 
 
 def _material(material: Material, count: int) -> str:
     strengths = {"tensile": material.tensile_strength, "compressive": material.compressive_strength}
-    known = [f"{name} strength {value / 1e6:g} MPa" for name, value in strengths.items() if value is not None]
+    strength = [
+        f"{name} strength {value / 1e6:g} MPa" for name, value in strengths.items() if value is not None
+    ]
     return ", ".join(
         [
             f"{material.name}, {count} stones: density {material.density:g} kg/m³",
             f"Young's modulus {material.young / 1e9:g} GPa, Poisson's ratio {material.poisson:g}",
-            *known,
+            *strength,
         ]
     )
 
@@ -152,14 +154,14 @@ def _laws(scene: SceneFile, built: Scene, groups: Groups) -> Iterator[str]:
     contact = dict(settings_of(scene, built)["contact"])
     law = dict(contact.pop("law"))
     yield f"{law.pop('type')}: {_named(law)}"
-    for one in scene.laws:
-        yield describe(one.entry, groups)
+    for rule in scene.laws:
+        yield describe(rule.entry, groups)
     yield _named(contact)
 
 
 def _named(values: Mapping[str, object]) -> str:
-    known = {name: value for name, value in values.items() if value is not None}
-    return ", ".join(f"{name} {_shown(value)}" for name, value in known.items())
+    stated = {name: value for name, value in values.items() if value is not None}
+    return ", ".join(f"{name} {_shown(value)}" for name, value in stated.items())
 
 
 def _shown(value: object) -> str:

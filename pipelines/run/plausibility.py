@@ -49,8 +49,8 @@ def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
         [_seen(stone) for stone in measured if OUTLINE_NOTE not in stone.record.notes]
     )
     texts = [f"stone {corner.code}: {corner.text}; measure its corners again" for corner in corners]
-    left = len(texts) - _SHOWN
-    return [*texts[:_SHOWN], *([f"{left} more signs of corners out of place"] if left > 0 else [])]
+    remaining = len(texts) - _SHOWN
+    return [*texts[:_SHOWN], *([f"{remaining} more signs of corners out of place"] if remaining > 0 else [])]
 
 
 def depth_warnings(models: Sequence[StoneModel]) -> list[str]:
@@ -63,11 +63,11 @@ def depth_warnings(models: Sequence[StoneModel]) -> list[str]:
     facing = np.array([record.normal for record in records]).reshape(-1, 3)
     upright = np.abs(facing[:, 2]) <= np.sin(np.radians(_SQUARE))
     turn = np.degrees(np.arctan2(facing[:, 1], facing[:, 0]))
-    left, texts = upright.copy(), list[str]()
-    while left.any():
-        first = float(turn[np.flatnonzero(left)[0]])
-        here = left & (np.abs((turn - first + 180.0) % 360.0 - 180.0) <= _SQUARE)
-        left &= ~here
+    remaining, texts = upright.copy(), list[str]()
+    while remaining.any():
+        first = float(turn[np.flatnonzero(remaining)[0]])
+        here = remaining & (np.abs((turn - first + 180.0) % 360.0 - 180.0) <= _SQUARE)
+        remaining &= ~here
         outwards = facing[here].mean(axis=0) * [1.0, 1.0, 0.0]
         texts += _thin(records, np.flatnonzero(here), outwards / np.linalg.norm(outwards))
     return texts

@@ -140,14 +140,14 @@ def surveyed_widths(joints: JointResult, codes: Sequence[str], closing: ClosingR
     codes : of its stones, in the order of their numbers
     closing : joints before the run. Of several joints of two stones, the one of most similar orientation counts
     """
-    known: dict[frozenset[str], list[StoneJoint]] = defaultdict(list)
+    by_stones: dict[frozenset[str], list[StoneJoint]] = defaultdict(list)
     for joint in closing.joints:
-        known[frozenset(joint.stones)].append(joint)
+        by_stones[frozenset(joint.stones)].append(joint)
     widths = np.full(len(joints.area), np.nan)
     for number, (stones, frame) in enumerate(zip(joints.bodies.tolist(), joints.frame, strict=True)):
-        found = known.get(frozenset(codes[stone] for stone in stones))
-        if found:
-            alike = max(found, key=lambda one: abs(float(one.normal @ frame[0])))
+        between = by_stones.get(frozenset(codes[stone] for stone in stones))
+        if between:
+            alike = max(between, key=lambda candidate: abs(float(candidate.normal @ frame[0])))
             # overlapping measurements give no thickness of mortar
             widths[number] = alike.width if alike.width >= 0.0 else np.nan
     return widths

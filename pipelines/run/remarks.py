@@ -27,7 +27,7 @@ def remarks(scene: SceneFile, groups: Groups, modelled: Mapping[str, Modelled]) 
     groups : which stones its tables name
     modelled : by code, the model of each stone
     """
-    soft = {code for code, one in modelled.items() if one.fidelity is Fidelity.DEFORMABLE}
+    soft = {code for code, model in modelled.items() if model.fidelity is Fidelity.DEFORMABLE}
     return (
         *_of_meshes(scene, groups, soft),
         *_of_stress(scene, groups, modelled),
@@ -45,7 +45,7 @@ def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: Closing
     rules : its laws, in their order, between groups of stones
     closing : the joints; none are known where stones stay as surveyed
     """
-    where, found = scene.document.where, list[str]()
+    where, without_effect = scene.document.where, list[str]()
     for rule_law in scene.laws:
         values = rule_law.entry.values
         if not values.get("tension") or not rule_law.law.friction:
@@ -53,12 +53,12 @@ def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: Closing
         carried = held_tension(rule_law.law.friction, values["tension"], values["shear"])
         if carried < values["tension"]:
             enough = rule_law.law.friction * values["tension"]
-            found.append(
+            without_effect.append(
                 f"{where(*rule_law.entry.path, 'tension')}: of tension = {values['tension']:g} Pa no more than "
                 f"shear/friction = {carried:.4g} Pa is held; a shear of {enough:.4g} Pa would hold all of it"
             )
     if closing.mode is JointMode.AS_SURVEYED:
-        return tuple(found)
+        return tuple(without_effect)
     holding = [0] * len(rules)
     joints = [0] * len(rules)
     for joint in closing.joints:
@@ -71,8 +71,8 @@ def remarks_on_laws(scene: SceneFile, rules: Sequence[LawRule], closing: Closing
         if not carried:
             reason = "later laws hold in all of them" if met else "it holds only where they come to meet"
             joined = f"{met} joints lie between its stones" if met else "no joint lies between its stones"
-            found.append(f"{where(*law.entry.path)}: [[laws]] has no effect: {joined}; {reason}")
-    return tuple(found)
+            without_effect.append(f"{where(*law.entry.path)}: [[laws]] has no effect: {joined}; {reason}")
+    return tuple(without_effect)
 
 
 def _lies_between(rule: LawRule, first: str, second: str) -> bool:
@@ -86,10 +86,10 @@ def remarks_on_stones(stones: Sequence[BlockyStone]) -> tuple[str, ...]:
     ]
     if not changed:
         return ()
-    moved = max(changed, key=lambda one: float(one.report.displacement.max()))
-    grown = max(changed, key=lambda one: abs(one.report.volume_change))
-    after = [volume_of(one.solid) for one in changed]
-    before = [new / (1.0 + one.report.volume_change) for new, one in zip(after, changed, strict=True)]
+    moved = max(changed, key=lambda stone: float(stone.report.displacement.max()))
+    grown = max(changed, key=lambda stone: abs(stone.report.volume_change))
+    after = [volume_of(stone.solid) for stone in changed]
+    before = [new / (1.0 + stone.report.volume_change) for new, stone in zip(after, changed, strict=True)]
     return (
         f"the warped faces of {len(changed)} stone{'' if len(changed) == 1 else 's'} were made plane: corners moved by "
         f"up to {1e3 * moved.report.displacement.max():.2g} mm (stone {moved.code}), volumes changed by up to "

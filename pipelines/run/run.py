@@ -154,7 +154,7 @@ def run_scene(
             scene = with_profile(scene, options.profile, models)
             progress(Progress("blocks", 0, None, f"closing the joints of {len(models)} stones"))
             assembly = _assembled(scene, models, session)
-            known = known_stones(session, [model.record.code for model in models])
+            surveyed = known_stones(session, [model.record.code for model in models])
         if options.meshes is not None:
             check_mesh_file(options.meshes, _elements(assembly))
         with _timed(seconds, "mesh"):
@@ -176,7 +176,7 @@ def run_scene(
             seconds |= result.wall_time
             stones, reached = stone_results(result), profile_report(options.profile, scene, result)
             with replacing(folder) as fresh:
-                writing = Writing(seconds, progress, reached, unfinished, ready, known, options.animate)
+                writing = Writing(seconds, progress, reached, unfinished, ready, surveyed, options.animate)
                 summary, warnings = write_results(result, stones, scene, assembly, fresh, writing)
                 unfinished.hand_over(fresh)
         if options.meshes is not None:

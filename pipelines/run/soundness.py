@@ -112,18 +112,18 @@ def _unclosed(assembly: Assembly) -> list[str]:
         return []
     fixed = {block.code for block in assembly.scene.blocks if block.fidelity is Fidelity.FIXED}
     closed = {code for joint in assembly.closing.joints if not joint.left_open for code in joint.stones}
-    left = {
+    open_stones = {
         code: joint.left_open
         for joint in reversed(assembly.closing.joints)
         for code in joint.stones
         if joint.left_open and code not in closed | fixed
     }
-    if not left:
+    if not open_stones:
         return []
-    first = min(left)
+    first = min(open_stones)
     return [
-        f"no joint of these could be closed: {some(sorted(left))}; of {first}, {left[first]}; look at the survey "
-        "there, or allow more by max_displacement in [joints]"
+        f"no joint of these could be closed: {some(sorted(open_stones))}; of {first}, {open_stones[first]}; look at "
+        "the survey there, or allow more by max_displacement in [joints]"
     ]
 
 
@@ -150,7 +150,7 @@ def _overlapping(assembly: Assembly) -> list[str]:
     deep = [overlap for overlap in assembly.closing.overlaps if overlap.depth > _DEEP]
     return [
         f"{' and '.join(pair.stones)} lie {pair.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
-        for pair in sorted(deep, key=lambda one: -one.volume)[:_NAMED]
+        for pair in sorted(deep, key=lambda overlap: -overlap.volume)[:_NAMED]
     ]
 
 
@@ -208,6 +208,6 @@ def _facts(problems: Sequence[str]) -> str:
 def unfinished_loads(assembly: Assembly) -> tuple[str, ...]:
     """Return in words the loads that are not over when a run ends, first those whose peak or strong part it misses."""
     scenes = [stage.scene for stage in assembly.stages] or [assembly.scene]
-    missed = [one for built in scenes for one in built.loads.unfinished(built.time.duration, True)]
-    others = [one for built in scenes for one in built.loads.unfinished(built.time.duration, False)]
+    missed = [load for built in scenes for load in built.loads.unfinished(built.time.duration, True)]
+    others = [load for built in scenes for load in built.loads.unfinished(built.time.duration, False)]
     return tuple(dict.fromkeys((*missed, *others)))

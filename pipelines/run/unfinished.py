@@ -265,9 +265,9 @@ def unfinished_run(
             with storing(str(folder)):
                 yield archive
         except StorageError as error:
-            if not (kept := _checkpoints(folder).steps()):
+            if not (checkpoints := _checkpoints(folder).steps()):
                 raise
-            how = f"--resume goes on after step {kept[0]}"
+            how = f"--resume goes on after step {checkpoints[0]}"
             raise StorageError(error.what, where=error.where, remedy=f"{error.remedy}; {how}") from error
         finally:
             if not _checkpoints(folder).steps():

@@ -244,8 +244,8 @@ def _adjust(faces: _Faces) -> _Adjusted:
     step[2] = (heights - arms @ step).mean()
     freedom, before = (count - 1.0, 2.0 * count - 2.0), 0.0
     for _ in range(_MAX_ITERATIONS):
-        left = float(((heights - arms @ step) ** 2).sum()), float(((slopes - step[:2]) ** 2).sum())
-        variances = max(left[0] / freedom[0], least[0]), max(left[1] / freedom[1], least[1])
+        squares = float(((heights - arms @ step) ** 2).sum()), float(((slopes - step[:2]) ** 2).sum())
+        variances = max(squares[0] / freedom[0], least[0]), max(squares[1] / freedom[1], least[1])
         inverse = np.linalg.inv(by_heights / variances[0] + by_slopes / variances[1])
         cofactors = np.asarray(inverse, dtype=np.float64)
         right = arms.T @ heights / variances[0] + np.append(slopes.sum(axis=0), 0.0) / variances[1]

@@ -84,9 +84,9 @@ class Neighbours:
         counts = self._counts[indices]
         first = np.cumsum(counts) - counts
         rows = np.repeat(self._starts[indices] - first, counts) + np.arange(counts.sum())
-        one = _to_segments(outline, self._corners[rows], self._next[rows]).min(axis=0)
-        other = _to_segments(self._corners[rows], outline, np.roll(outline, -1, axis=0)).min(axis=1)
-        out: Array = np.minimum.reduceat(np.minimum(one, other), first)
+        to_outline = _to_segments(outline, self._corners[rows], self._next[rows]).min(axis=0)
+        from_outline = _to_segments(self._corners[rows], outline, np.roll(outline, -1, axis=0)).min(axis=1)
+        out: Array = np.minimum.reduceat(np.minimum(to_outline, from_outline), first)
         return out
 
     def on_wall(self, centre: Array, normal: Array, size: float) -> Indices:
@@ -113,6 +113,6 @@ def _to_segments(points: Array, starts: Array, ends: Array) -> Array:
     run = ends - starts
     length = np.maximum((run**2).sum(axis=1), 1e-300)
     from_start = points[:, None] - starts[None]
-    part = np.clip((from_start * run).sum(axis=2) / length, 0.0, 1.0)
-    out: Array = np.linalg.norm(from_start - part[..., None] * run, axis=2)
+    fraction = np.clip((from_start * run).sum(axis=2) / length, 0.0, 1.0)
+    out: Array = np.linalg.norm(from_start - fraction[..., None] * run, axis=2)
     return out

@@ -64,8 +64,8 @@ def judge_shape(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> Fac
     """
     if fit.redundancy == 0:
         return FaceShape(ShapeKind.UNTESTED, "untested: three points lie on any plane")
-    known, count = sigma is not None, len(fit.residuals)
-    if known and not fit.rejected and fit.sigma0**2 <= likely_ratio(fit.redundancy, 1.2816):
+    stated, count = sigma is not None, len(fit.residuals)
+    if stated and not fit.rejected and fit.sigma0**2 <= likely_ratio(fit.redundancy, 1.2816):
         return FaceShape(ShapeKind.PLANE, f"plane: {count} points, rms {fit.rms * 1e3:.1f} mm")
     return explain_heights(fit, points, sigma)
 
@@ -115,10 +115,10 @@ def _heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> _Heigh
     lateral = (np.asarray(points, dtype=np.float64) - fit.centroid) @ fit.axes.T
     z, off = fit.residuals, np.zeros(len(fit.residuals), dtype=bool)
     off[list(fit.rejected)] = True
-    known, root = sigma is not None, np.empty_like(z)
+    stated, root = sigma is not None, np.empty_like(z)
     root[:] = 1.0 / np.asarray(fit.sigma0 if sigma is None else sigma, dtype=np.float64)
     u, v = (np.ascontiguousarray(column) for column in lateral.T)
-    return _Heights(u, v, z, root, off, known)
+    return _Heights(u, v, z, root, off, stated)
 
 
 def _curved(face: _Heights) -> tuple[float, FaceShape] | None:
@@ -180,7 +180,7 @@ def _squares(design: Array, face: _Heights, chosen: Bools) -> tuple[float, tuple
     return total, None if math.isnan(coefficients[0]) else (coefficients, inverse), without
 
 
-def _curvature(coefficients: Array, covariance: Array, held: int, count: int) -> FaceShape:
+def _curvature(coefficients: Array, covariance: Array, used: int, count: int) -> FaceShape:
     """Compute the principal curvatures of z = z₀ + p u + q v + a u² + b uv + c v², positive towards the observer.
 
     Eigenvalues of the second fundamental form in the first (do Carmo 1976, section 3.3).
@@ -198,7 +198,7 @@ def _curvature(coefficients: Array, covariance: Array, held: int, count: int) ->
     radius = 1.0 / abs(curvature[0])
     text = (
         f"curved {side}: radius {radius:.3g} m ± {deviation[0] * radius**2:.2g} m, "
-        f"across it {curvature[1]:.2g} ± {deviation[1]:.2g} 1/m, by {held} of {count} points"
+        f"across it {curvature[1]:.2g} ± {deviation[1]:.2g} 1/m, by {used} of {count} points"
     )
     return FaceShape(ShapeKind.CURVED, text, curvature=curvature, curvature_sigma=deviation)
 

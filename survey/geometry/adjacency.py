@@ -153,9 +153,9 @@ def find_touching(
     pairs, rows = [np.zeros((0, 2), np.int64)], [np.zeros((0, 8))]
     for pair in near_pairs(boxes_of(planes[2], solids.solid_starts, width), wanted):
         room = GROUPS * len(pair)
-        found, values = np.empty((room, 2), np.int64), np.empty((room, 8))
-        count = touching_faces(pair, solid, planes, limits, found, values)
-        pairs.append(found[:count].copy())
+        touching, values = np.empty((room, 2), np.int64), np.empty((room, 8))
+        count = touching_faces(pair, solid, planes, limits, touching, values)
+        pairs.append(touching[:count].copy())
         rows.append(values[:count].copy())
     all_pairs, all_rows = np.concatenate(pairs), np.concatenate(rows)
     seen = open_to_each_other(all_pairs, all_rows, solid, planes, width)
@@ -177,8 +177,8 @@ def open_to_each_other(pairs: Ints, rows: Array, solid: Any, planes: Any, width:
     both = np.concatenate([pairs, pairs[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
     starts = np.searchsorted(both[:, 0], np.arange(len(thinnest) + 1))
-    near = (starts, np.ascontiguousarray(both[:, 1]))
-    out: Bools = ~hidden(pairs, rows, near, solid, planes, thinnest, 0.5 * width)
+    ranges = (starts, np.ascontiguousarray(both[:, 1]))
+    out: Bools = ~hidden(pairs, rows, ranges, solid, planes, thinnest, 0.5 * width)
     return out
 
 

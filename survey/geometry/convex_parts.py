@@ -84,7 +84,7 @@ class _Cutter:
     def parts(self) -> tuple[Solid, ...]:
         """Return the best of several decompositions."""
         whole = _Region((), tuple(self._pieces()), reflex_edges(self._local))
-        ranked = sorted(self._ranked(whole), key=lambda one: one[0])
+        ranked = sorted(self._ranked(whole), key=lambda candidate: candidate[0])
         beginnings = [cut for rank, cut in ranked if rank[0] == ranked[0][0][0]][:_BEGINNINGS]
         starts: list[Plane | None] = [*beginnings] or [None]
         candidates = [
@@ -107,7 +107,7 @@ class _Cutter:
                 remedy="simplify it, or divide it into several stones",
             )
         best = max(filling, key=self._worth)
-        return tuple(replace(part, vertices=self._placed(part.vertices)) for part in best)
+        return tuple(replace(piece, vertices=self._placed(piece.vertices)) for piece in best)
 
     def _worth(self, parts: Sequence[Solid]) -> tuple[int, float]:
         """Return a key that is greater for fewer parts, then for a thicker thinnest part."""
@@ -122,7 +122,7 @@ class _Cutter:
             else:
                 for triangle in triangulate(replace(self._local, faces=(face,))).tolist():
                     a, b, c = self._local.vertices[triangle]
-                    longest = max(float(np.linalg.norm(one)) for one in (b - a, c - b, a - c))
+                    longest = max(float(np.linalg.norm(side)) for side in (b - a, c - b, a - c))
                     if float(np.linalg.norm(np.cross(b - a, c - a))) > self._flat * longest:
                         yield k, tuple(corners[i] for i in triangle)
 
@@ -154,14 +154,14 @@ class _Cutter:
             if len(waiting) + len(done) >= self._most:
                 return None
             if not region.pieces or self._is_convex(region):
-                part = self._part(region)
-                if part is not None:
-                    done.append(part)
+                piece = self._part(region)
+                if piece is not None:
+                    done.append(piece)
                 continue
             ranked = list(self._ranked(region))
             if not ranked:
                 return None
-            waiting += self._halves(region, min(ranked, key=lambda one: one[0])[1])
+            waiting += self._halves(region, min(ranked, key=lambda candidate: candidate[0])[1])
         return done
 
     def _is_convex(self, region: _Region) -> bool:
@@ -173,15 +173,15 @@ class _Cutter:
         planes = [*dict.fromkeys(self._planes[k] for k, _ in region.pieces), *region.cuts]
         margin = 0.01 * self._size
         low, high = self._low - self._origin - margin, self._high - self._origin + margin
-        part = intersection(self._solid.code, planes, low, high, self._on)
-        if part is None or (not region.pieces and not self._holds(part.vertices.mean(axis=0))):
+        solid = intersection(self._solid.code, planes, low, high, self._on)
+        if solid is None or (not region.pieces and not self._holds(solid.vertices.mean(axis=0))):
             return None
-        return part
+        return solid
 
     def _holds(self, place: Array) -> bool:
         """Return whether a place is in the stone, by the solid angle of its faces (van Oosterom & Strackee 1983)."""
         a, b, c = (self._local.vertices[triangulate(self._local)[:, k]] - place for k in range(3))
-        p, q, r = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+        p, q, r = (np.linalg.norm(arm, axis=1) for arm in (a, b, c))
         over = (a * np.cross(b, c)).sum(axis=1)
         under = p * q * r + (a * b).sum(axis=1) * r + (b * c).sum(axis=1) * p + (c * a).sum(axis=1) * q
         return bool(np.arctan2(over, under).sum() > np.pi)
@@ -231,32 +231,32 @@ class _Cutter:
 
     def _halves(self, region: _Region, cut: Plane) -> tuple[_Region, _Region]:
         """Return the parts of a region behind and in front of a plane."""
-        other = (-cut[0], -cut[1], -cut[2], -cut[3])
-        return self._behind(region, cut), self._behind(region, other)
+        reverse = (-cut[0], -cut[1], -cut[2], -cut[3])
+        return self._behind(region, cut), self._behind(region, reverse)
 
     def _behind(self, region: _Region, cut: Plane) -> _Region:
         pieces = []
         for k, polygon in region.pieces:
-            left = _clipped(polygon, cut, self._on)
-            if left is None:  # it lies in the cut, and belongs to the side whose boundary it is
+            behind = _clipped(polygon, cut, self._on)
+            if behind is None:  # it lies in the cut, and belongs to the side whose boundary it is
                 plane = self._planes[k]
                 if plane[0] * cut[0] + plane[1] * cut[1] + plane[2] * cut[2] > 0.0:
                     pieces.append((k, polygon))
-            elif len(left) > 2:
-                pieces.append((k, left))
+            elif len(behind) > 2:
+                pieces.append((k, behind))
         edges = []
         for edge in region.edges:
-            left = _clipped((edge.start, edge.stop), cut, self._on)
-            if left is not None and len(left) == 2:
-                edges.append(replace(edge, start=left[0], stop=left[1]))
+            behind = _clipped((edge.start, edge.stop), cut, self._on)
+            if behind is not None and len(behind) == 2:
+                edges.append(replace(edge, start=behind[0], stop=behind[1]))
         return _Region((*region.cuts, cut), tuple(pieces), tuple(edges))
 
     def _placed(self, vertices: Array) -> Array:
         """Return corners in the frame of the stone; its own corners keep their last digit."""
         away = np.linalg.norm(vertices[:, None] - self._local.vertices, axis=2)
         nearest = away.argmin(axis=1)
-        own = away[np.arange(len(vertices)), nearest] <= self._flat
-        out: Array = np.where(own[:, None], self._solid.vertices[nearest], vertices + self._origin)
+        nearby = away[np.arange(len(vertices)), nearest] <= self._flat
+        out: Array = np.where(nearby[:, None], self._solid.vertices[nearest], vertices + self._origin)
         return out
 
     def _is_filled(self, parts: Sequence[Solid]) -> bool:
@@ -301,17 +301,17 @@ def _clipped(polygon: tuple[Place, ...], cut: Plane, on: float) -> tuple[Place, 
         return polygon if min(heights) < -on else None
     if min(heights) >= -on:
         return ()
-    left = []
+    behind = []
     for i, place in enumerate(polygon):
         k = (i + 1) % len(polygon)
         h, g = heights[i], heights[k]
         if h <= on:
-            left.append(place)
+            behind.append(place)
         if (h < -on and g > on) or (h > on and g < -on):
             t, following = h / (h - g), polygon[k]
             x, y, z = (p + t * (q - p) for p, q in zip(place, following, strict=True))
-            left.append((x, y, z))
-    return tuple(left[:2]) if len(polygon) == 2 else tuple(left)
+            behind.append((x, y, z))
+    return tuple(behind[:2]) if len(polygon) == 2 else tuple(behind)
 
 
 def _width(solid: Solid) -> float:

@@ -62,9 +62,9 @@ def cut_stones(
             if same[k]:
                 solid = Solid(solids[i].code, moved[k], faces)
                 out[i] = CutStone(solid, tuple(range(len(faces))))
-    for i, own in cut.items():
+    for i, cuts in cut.items():
         if i not in out:
-            out[i] = _cut(solids[i], own)
+            out[i] = _cut(solids[i], cuts)
     return out
 
 
@@ -126,7 +126,7 @@ def _meeting(faces: Faces) -> Ints | None:
     for number, face in enumerate(faces):
         for corner in face:
             at[corner].append(number)
-    return np.array(at) if all(len(own) == 3 for own in at) else None
+    return np.array(at) if all(len(meeting) == 3 for meeting in at) else None
 
 
 def _moved(faces: Faces, planes: Array) -> tuple[Array, Bools]:

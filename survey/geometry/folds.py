@@ -48,14 +48,17 @@ def fold(vertices: Array, polygon: Polygon, tolerance: float) -> list[Polygon]:
     size = float(np.linalg.norm(np.ptp(vertices[list(polygon)], axis=0)))
     best, score = None, (float("inf"), float("inf"))
     for halves in _halves(vertices, polygon):
-        left = max(warp(vertices[list(half)]) for half in halves)
+        warped = max(warp(vertices[list(half)]) for half in halves)
         across = float(np.linalg.norm(vertices[halves[0][0]] - vertices[halves[0][-1]]))
-        candidate = (_ALIKE * size * round(left / (_ALIKE * size)) if np.isfinite(left) else left, across)
+        candidate = (
+            _ALIKE * size * round(warped / (_ALIKE * size)) if np.isfinite(warped) else warped,
+            across,
+        )
         if candidate < score:
             best, score = halves, candidate
     if best is None:  # no diagonal lies within it: it crosses itself, or is seen from the side everywhere
         return [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
-    return [one for half in best for one in fold(vertices, half, tolerance)]
+    return [flat for half in best for flat in fold(vertices, half, tolerance)]
 
 
 def _halves(vertices: Array, polygon: Polygon) -> Iterator[tuple[Polygon, Polygon]]:

@@ -59,9 +59,9 @@ def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
     best = min((_boxes(filled, order) for order in permutations(range(3))), key=len)
     parts = [_part(solid.code, nodes, box) for box in best]
     whole = volume_of(local)
-    if abs(sum(volume_of(part) for part in parts) - whole) > _VOLUME * whole:
+    if abs(sum(volume_of(piece) for piece in parts) - whole) > _VOLUME * whole:
         return None
-    return tuple(Solid(part.code, part.vertices + origin, part.faces) for part in parts)
+    return tuple(Solid(piece.code, piece.vertices + origin, piece.faces) for piece in parts)
 
 
 def _families(solid: Solid) -> list[Array] | None:
@@ -121,7 +121,7 @@ def _inside(solid: Solid, nodes: Array) -> Bools:
 def _angles(points: Array, triangles: Array) -> Array:
     """Return the solid angles (n,) of a closed surface seen from points (van Oosterom & Strackee 1983)."""
     a, b, c = (triangles[None, :, k] - points[:, None] for k in range(3))
-    la, lb, lc = (np.linalg.norm(one, axis=2) for one in (a, b, c))
+    la, lb, lc = (np.linalg.norm(vector, axis=2) for vector in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=2)
     scale = la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la + (c * a).sum(axis=2) * lb
     out: Array = np.abs(2.0 * np.arctan2(volume, scale).sum(axis=1))
@@ -130,19 +130,19 @@ def _angles(points: Array, triangles: Array) -> Array:
 
 def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
     """Yield boxes of filled cells, each extended from the first one left along one axis after the other."""
-    left, boxes = filled.copy(), []
+    remaining, boxes = filled.copy(), []
     for first in np.argwhere(filled).tolist():
-        if not left[tuple(first)]:
+        if not remaining[tuple(first)]:
             continue
         spans = [[p, p + 1] for p in first]
         for axis in order:
-            for stop in range(spans[axis][1], left.shape[axis]):
+            for stop in range(spans[axis][1], remaining.shape[axis]):
                 layer = [slice(*span) for span in spans]
                 layer[axis] = slice(stop, stop + 1)
-                if not left[tuple(layer)].all():
+                if not remaining[tuple(layer)].all():
                     break
                 spans[axis][1] = stop + 1
-        left[tuple(slice(*span) for span in spans)] = False
+        remaining[tuple(slice(*span) for span in spans)] = False
         boxes.append(tuple((a, b) for a, b in spans))
     return boxes
 
@@ -150,8 +150,12 @@ def _boxes(filled: Bools, order: Sequence[int]) -> list[Box]:
 def _part(code: str, nodes: Array, box: Box) -> Solid:
     """Return the hexahedron of a box of cells."""
     vertices = np.array([nodes[place] for place in _corners(box)])
-    part = Solid(code, vertices, BOX)
-    return part if volume_of(part) > 0.0 else Solid(code, vertices, tuple(face[::-1] for face in BOX))
+    hexahedron = Solid(code, vertices, BOX)
+    return (
+        hexahedron
+        if volume_of(hexahedron) > 0.0
+        else Solid(code, vertices, tuple(face[::-1] for face in BOX))
+    )
 
 
 def _corners(box: Box) -> Iterator[tuple[int, int, int]]:

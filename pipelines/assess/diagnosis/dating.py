@@ -120,8 +120,8 @@ def _evidence(
                 "their beds may follow what had moved already and are left out"
             )
         # the last courses of a phase before the break, the first of the later one
-        near = sorted(dated, key=lambda line: line.line.course, reverse=index == 0)
-        texts = [text for line in near if (text := _course(line, measurements.resting)) is not None]
+        nearest = sorted(dated, key=lambda line: line.line.course, reverse=index == 0)
+        texts = [text for line in nearest if (text := _course(line, measurements.resting)) is not None]
         yield from texts[:_MAX_NAMED]
 
 

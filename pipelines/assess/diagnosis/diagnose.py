@@ -103,10 +103,10 @@ def diagnose(
 
 
 def _dated(
-    file: DiagnosisFile, cases: Sequence[Case], found: Measurements, done: Fitted, runs: Runs
+    file: DiagnosisFile, cases: Sequence[Case], measured: Measurements, done: Fitted, runs: Runs
 ) -> Dating:
     """Date the best hypothesis, with a run of what it would have moved if all phases had stood."""
     best = done.ranking.hypotheses[0]
     case = next(case for case in cases if case.hypothesis.name == best.name and not case.later)
     (tried,) = runs([(case, best.fit.amplitudes)])
-    return date_movement(file, done.ranking, found, tried.motions or Motions({}, {}))
+    return date_movement(file, done.ranking, measured, tried.motions or Motions({}, {}))

@@ -203,8 +203,8 @@ def _hypotheses(document: TomlDocument, toml: Mapping[str, Any]) -> Iterator[Hyp
         head = read_table(document, path, plain, HypothesisTable, "[[hypotheses]]")
         if head.name in names.values():
             document.fail(f"two hypotheses {head.name!r}", *path, "name", remedy="name each differently")
-        if (other := names.setdefault(plain_form(head.name), head.name)) != head.name:
-            what = f"the hypothesis {explained(head.name, other)}"
+        if (first := names.setdefault(plain_form(head.name), head.name)) != head.name:
+            what = f"the hypothesis {explained(head.name, first)}"
             document.fail(what, *path, "name", remedy="name each differently")
         unknowns = tuple(_unknowns(document, path, table))
         _check_formulas(document, path, head.scene, [unknown.name for unknown in unknowns])

@@ -129,7 +129,10 @@ def _scan(
         for k, unknown in enumerate(unknowns)
     ]
     few = max(2, _SCANNED // max(1, sum(blind)))
-    counts = [unknown.scan or (few if own else 0) for unknown, own in zip(unknowns, blind, strict=True)]
+    counts = [
+        unknown.scan or (few if unanswered else 0)
+        for unknown, unanswered in zip(unknowns, blind, strict=True)
+    ]
     if not any(counts):
         return []
     values = [
@@ -145,12 +148,12 @@ def _least(
     places: Sequence[tuple[float, ...]], answer: Sequence[Array | str], residuals: Array | None
 ) -> tuple[float, ...] | None:
     """Return the place with the least χ², if it is less than that of the start."""
-    known = [
+    answered = [
         (float(residual @ residual), place)
         for residual, place in zip(answer, places, strict=True)
         if not isinstance(residual, str)
     ]
-    chi2, best = min(known, default=(np.inf, None))
+    chi2, best = min(answered, default=(np.inf, None))
     return best if residuals is None or chi2 < float(residuals @ residuals) - _ENOUGH else None
 
 

@@ -63,16 +63,16 @@ def measurements(file: DiagnosisFile, url: str) -> Measurements:
         ]
         solids = digest([latest_entry(session), records])
         rows = find_rows(session, "entity", (), columns=("code", "phase")) if file.phases else ()
-    known = {str(row["code"]): row["phase"] for row in rows}
-    phases = {stone.code: known.get(stone.code) for stone in stones} if file.phases else {}
+    phase_of = {str(row["code"]): row["phase"] for row in rows}
+    phases = {stone.code: phase_of.get(stone.code) for stone in stones} if file.phases else {}
     for code, phase in phases.items():
         if phase not in file.phases:
             what = (
                 f"stone {code} is of {'no phase' if phase is None else f'phase {phase}, which is not listed'}"
             )
             file.document.fail(what, "diagnosis", "phases", remedy="record its phase, or leave 'phases' out")
-    found = measure(file, stones, facades, {code: str(phase) for code, phase in phases.items()})
-    return replace(found, solids=solids, inputs=inputs)
+    measured = measure(file, stones, facades, {code: str(phase) for code, phase in phases.items()})
+    return replace(measured, solids=solids, inputs=inputs)
 
 
 def measure(

@@ -136,16 +136,16 @@ def rank(
     freedom : degrees of freedom of the scatter of beds; 0: it is taken as exact
     """
     count = len(unknowns)
-    left = max(dof - count, 1)
+    redundancy = max(dof - count, 1)
     if not len(fit.residuals):
-        return Ranked(name, stood, fit, left, 0.0, math.inf, (), (f"not run: {fit.trouble}",))
-    ratio = fit.chi2 / left
-    probability = float(fdtrc(left, freedom or 1e9, ratio))
+        return Ranked(name, stood, fit, redundancy, 0.0, math.inf, (), (f"not run: {fit.trouble}",))
+    ratio = fit.chi2 / redundancy
+    probability = float(fdtrc(redundancy, freedom or 1e9, ratio))
     aicc = fit.chi2 + 2.0 * count + 2.0 * count * (count + 1) / max(dof - count - 1, 1)
-    estimated = tuple(estimates(unknowns, fit, left))
+    estimated = tuple(estimates(unknowns, fit, redundancy))
     tied = tuple(_tied(unknowns, fit))
     remarks = (*_remarks(unknowns, fit, estimated), *tied)
-    return Ranked(name, stood, fit, left, probability, aicc, estimated, remarks, tied)
+    return Ranked(name, stood, fit, redundancy, probability, aicc, estimated, remarks, tied)
 
 
 def estimates(unknowns: Sequence[Unknown], fit: Fit, dof: int) -> Iterator[Estimate]:
@@ -164,16 +164,18 @@ def estimates(unknowns: Sequence[Unknown], fit: Fit, dof: int) -> Iterator[Estim
         yield Estimate(unknown.name, unknown.unit, value, value - half, value + half, bound)
 
 
-def _remarks(unknowns: Sequence[Unknown], fit: Fit, own: Sequence[Estimate]) -> Iterator[str]:
+def _remarks(unknowns: Sequence[Unknown], fit: Fit, estimated: Sequence[Estimate]) -> Iterator[str]:
     names = [unknown.name for unknown in unknowns]
     if fit.trouble:
         yield fit.trouble
-    for estimate in own:
+    for estimate in estimated:
         if estimate.at_bound:
             yield f"{estimate.name} lies at a bound of its range"
     for direction in fit.undetermined:
         parts = [
-            f"{part:+.2f} {name}" for part, name in zip(direction, names, strict=True) if abs(part) > 0.1
+            f"{component:+.2f} {name}"
+            for component, name in zip(direction, names, strict=True)
+            if abs(component) > 0.1
         ]
         directions = " ".join(parts) if len(parts) > 1 else parts[0].split()[1]
         yield f"not determined, as it moves nothing that was measured: {directions}"
@@ -241,12 +243,12 @@ def verdict(ranking: Ranking) -> str:
         )
     rivals = [rival for rival in ranking.rivals if rival.name != best.name]
     names = " and ".join(repr(rival.name) for rival in rivals)
-    other = (
+    unclear = (
         f"it cannot be told apart from {names}"
         if rivals
         else "a cause that is not in the list may move the stones alike"
     )
-    caution = f"CAUTION: {'; '.join(filter(None, (best.fit.trouble, uneven, *best.tied, other)))}"
+    caution = f"CAUTION: {'; '.join(filter(None, (best.fit.trouble, uneven, *best.tied, unclear)))}"
     amounts = "; ".join(_amount(estimate) for estimate in best.estimates)
     return f"{best.title!r} explains what was measured ({chi2}){f': {amounts}' if amounts else ''}; {caution}"
 

@@ -249,16 +249,16 @@ class _Copies:
         self._source, self._target = source, target
         self._names: dict[Path, str] = {}
 
-    def named(self, part: Any) -> Any:
+    def named(self, content: Any) -> Any:
         """Return part of a scene with the names of the copies."""
-        if isinstance(part, list):
-            return [self.named(entry) for entry in part]
-        if not isinstance(part, Mapping):
-            return part
-        names = RECORDS if part.get("type") == "ground_motion" else ("file",)
+        if isinstance(content, list):
+            return [self.named(entry) for entry in content]
+        if not isinstance(content, Mapping):
+            return content
+        names = RECORDS if content.get("type") == "ground_motion" else ("file",)
         return {
             key: self._copied(value) if key in names and isinstance(value, str) else self.named(value)
-            for key, value in part.items()
+            for key, value in content.items()
         }
 
     def _copied(self, name: str) -> str:

@@ -212,14 +212,14 @@ def kept_runner(file: DiagnosisFile, solids: str, store: Kept, run: Runner) -> R
     return made
 
 
-def named_files(part: Any, scene: str | Path) -> Iterator[Path]:
+def named_files(content: Any, scene: str | Path) -> Iterator[Path]:
     """Yield the files that the contents of a scene file name, which lie beside it."""
-    if isinstance(part, list):
-        for entry in part:
+    if isinstance(content, list):
+        for entry in content:
             yield from named_files(entry, scene)
-    elif isinstance(part, Mapping):
-        names = RECORDS if part.get("type") == "ground_motion" else ("file",)
-        for key, entry in part.items():
+    elif isinstance(content, Mapping):
+        names = RECORDS if content.get("type") == "ground_motion" else ("file",)
+        for key, entry in content.items():
             if key in names and isinstance(entry, str):
                 yield Path(scene).parent / entry
             else:
@@ -248,35 +248,35 @@ def fit_cases(
     """
     searches: dict[int, Ask] = {k: fit(case.hypothesis.unknowns) for k, case in enumerate(cases)}
     asked = {k: next(search) for k, search in searches.items()}
-    known: _Known = {}
+    trials: _Known = {}
 
     turns: Counter[int] = Counter()
 
     def make(places: Mapping[int, Sequence[tuple[float, ...]]], text: str = "") -> None:
         """Run all places that have no result yet, and report progress."""
-        fresh = [place for k, xs in places.items() for x in xs if (place := (k, x)) not in known]
+        fresh = [place for k, xs in places.items() for x in xs if (place := (k, x)) not in trials]
         fresh = list(dict.fromkeys(fresh))
         turns.update(list(places))
-        total = len(known) + len(fresh) + (0 if text else _to_come(cases, asked, turns))
-        progress(Progress("run", len(known), total, text or _of_hypotheses(places)))
+        total = len(trials) + len(fresh) + (0 if text else _to_come(cases, asked, turns))
+        progress(Progress("run", len(trials), total, text or _of_hypotheses(places)))
         for place, tried in zip(fresh, runs([(cases[k], x) for k, x in fresh]), strict=True):
-            known[place] = tried
-            progress(Progress("run", len(known), total, text or _of_hypotheses(places)))
+            trials[place] = tried
+            progress(Progress("run", len(trials), total, text or _of_hypotheses(places)))
 
     fits: dict[int, Fit] = {}
     while asked:
         make(asked)
         for k, xs in tuple(asked.items()):
             try:
-                asked[k] = searches[k].send([_answer(known[k, x], deformation) for x in xs])
+                asked[k] = searches[k].send([_answer(trials[k, x], deformation) for x in xs])
             except StopIteration as end:
                 fits[k] = end.value
                 del asked[k]
                 headline = _found(cases[k], fits[k], deformation.dof)
                 progress(
-                    Progress("run", len(known), len(known) + _to_come(cases, asked, turns), found=headline)
+                    Progress("run", len(trials), len(trials) + _to_come(cases, asked, turns), found=headline)
                 )
-    ranked, motions = _ranked(cases, fits, known, deformation)
+    ranked, motions = _ranked(cases, fits, trials, deformation)
     # those that may be reported: the best, and what cannot be told apart from it
     least = min(hypothesis.aicc for hypothesis in ranked)
     close = {
@@ -287,14 +287,14 @@ def fit_cases(
     if close:
         make(close, "intervals")
     for k, xs in close.items():
-        ranked[k] = _with_probes(ranked[k], cases[k], k, xs, known, deformation)
+        ranked[k] = _with_probes(ranked[k], cases[k], k, xs, trials, deformation)
     ordered = tuple(sorted(ranked, key=lambda hypothesis: hypothesis.aicc))
     ranking = Ranking(ordered, _rank_of_no_movement(deformation))
-    return Fitted(ranking, motions, len(known), sum(trial.cpu for trial in known.values()))
+    return Fitted(ranking, motions, len(trials), sum(trial.cpu for trial in trials.values()))
 
 
 def _ranked(
-    cases: Sequence[Case], fits: Mapping[int, Fit], known: _Known, deformation: Deformation
+    cases: Sequence[Case], fits: Mapping[int, Fit], trials: _Known, deformation: Deformation
 ) -> tuple[list[Ranked], dict[tuple[str, tuple[str, ...]], Motions]]:
     """Return the rank of each case, and the motions of its best run, by its name and the phases that stood."""
     ranked, motions = list[Ranked](), dict[tuple[str, tuple[str, ...]], Motions]()
@@ -303,7 +303,7 @@ def _ranked(
         fitted = rank(
             case.hypothesis.name, case.stood, unknowns, fits[k], deformation.dof, deformation.freedom
         )
-        last = known[k, fits[k].amplitudes]
+        last = trials[k, fits[k].amplitudes]
         if last.motions is not None and last.fault:
             fitted = replace(fitted, remarks=(*fitted.remarks, last.fault))
         ranked.append(fitted)
@@ -323,15 +323,15 @@ def _with_probes(
     case: Case,
     k: int,
     places: Sequence[tuple[float, ...]],
-    known: _Known,
+    trials: _Known,
     deformation: Deformation,
 ) -> Ranked:
     """Return the rank of the k-th case with intervals from the runs around its fit, and with its other runs."""
-    answers = {x: _answer(known[k, x], deformation) for x in places}
+    answers = {x: _answer(trials[k, x], deformation) for x in places}
     uneven = with_unevenness(ranked, case.hypothesis.unknowns, answers)
     everywhere = {
         x: _answer(tried, deformation)
-        for (number, x), tried in known.items()
+        for (number, x), tried in trials.items()
         if number == k and tried.motions
     }
     misfits = {
@@ -344,11 +344,11 @@ def _with_probes(
 
 def _to_come(cases: Sequence[Case], asked: Iterable[int], turns: Mapping[int, int]) -> int:
     """Return how many runs are expected after those that have been asked for, as searches usually go."""
-    left = 0
+    remaining = 0
     for k in asked:
-        left += max(1, _USUAL_TURNS - turns[k]) * (1 + len(cases[k].hypothesis.unknowns))
+        remaining += max(1, _USUAL_TURNS - turns[k]) * (1 + len(cases[k].hypothesis.unknowns))
     # one or two hypotheses are worth the runs for their intervals
-    return left + 4 * max((len(case.hypothesis.unknowns) for case in cases), default=0)
+    return remaining + 4 * max((len(case.hypothesis.unknowns) for case in cases), default=0)
 
 
 def _of_hypotheses(places: Iterable[int]) -> str:

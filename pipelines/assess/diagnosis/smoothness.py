@@ -27,13 +27,13 @@ Answer = Array | str
 
 def probes(unknowns: Sequence[Unknown], best: Place) -> list[list[Place]]:
     """Return for each unknown five places across its best amplitude, within its bounds, the others at their best."""
-    found = []
+    places = []
     for k, unknown in enumerate(unknowns):
         middle = min(max(best[k], unknown.low + unknown.change), unknown.high - unknown.change)
-        found.append(
+        places.append(
             [(*best[:k], float(middle + unknown.change * share), *best[k + 1 :]) for share in _OFFSETS]
         )
-    return found
+    return places
 
 
 def with_unevenness(ranked: Ranked, unknowns: Sequence[Unknown], answers: Mapping[Place, Answer]) -> Ranked:
@@ -45,24 +45,26 @@ def with_unevenness(ranked: Ranked, unknowns: Sequence[Unknown], answers: Mappin
     unknowns : of the hypothesis
     answers : residuals (m,) at the places of `probes`; a text where a run has failed
     """
-    rows = [[answers[place] for place in own] for own in probes(unknowns, ranked.fit.amplitudes)]
+    rows = [[answers[place] for place in probed] for probed in probes(unknowns, ranked.fit.amplitudes)]
     failed = next((answer for row in rows for answer in row if isinstance(answer, str)), None)
     if failed is not None:
         remark = f"runs beside its best amounts fail, so that its intervals may be too narrow: {failed}"
         return replace(ranked, remarks=(*ranked.remarks, remark))
     residuals = np.array(rows)
-    steps = np.array([one.change for one in unknowns])
+    steps = np.array([parameter.change for parameter in unknowns])
     jacobian = ((residuals[:, -1] - residuals[:, 0]) / (2.0 * steps)[:, None]).T
     inverse = np.linalg.pinv(jacobian)
     wide = float(stdtrit(ranked.dof, QUANTILE))
     estimates, uneven = [], []
-    for k, (unknown, own) in enumerate(zip(unknowns, ranked.estimates, strict=True)):
-        told = unknown.change * _OFFSETS - residuals[k] @ inverse[k]
-        left = told - np.polyval(np.polyfit(_OFFSETS, told, 2), _OFFSETS)
-        sigma = float(np.sqrt(left @ left / (len(left) - 3)))
-        half = own.high - own.value
+    for k, (unknown, estimate) in enumerate(zip(unknowns, ranked.estimates, strict=True)):
+        predicted = unknown.change * _OFFSETS - residuals[k] @ inverse[k]
+        deviation = predicted - np.polyval(np.polyfit(_OFFSETS, predicted, 2), _OFFSETS)
+        sigma = float(np.sqrt(deviation @ deviation / (len(deviation) - 3)))
+        half = estimate.high - estimate.value
         if np.isfinite(half) and sigma > _UNEVEN * half / wide:
-            uneven.append(f"{own.name} by {sigma:.2g} {own.unit}")
+            uneven.append(f"{estimate.name} by {sigma:.2g} {estimate.unit}")
         half = float(np.hypot(half, wide * sigma))
-        estimates.append(replace(own, low=own.value - half, high=own.value + half, run_sigma=sigma))
+        estimates.append(
+            replace(estimate, low=estimate.value - half, high=estimate.value + half, run_sigma=sigma)
+        )
     return replace(ranked, estimates=tuple(estimates), uneven=tuple(uneven))

@@ -78,8 +78,8 @@ def _law(law: Law, name: str, factor: float) -> Law:
     changed: Any = replace(
         law, **{key: factor * value for key, value in present.items() if value is not None}
     )
-    found: Law = changed
-    return found
+    scaled: Law = changed
+    return scaled
 
 
 def banded(
@@ -103,9 +103,9 @@ def banded(
     variance, square = np.zeros(_POINTS), 0.0
     force, parts = mean.at(places), dict[str, float]()
     for name, variation in scatter.items():
-        other = tested(name, 1.0 + variation)
-        variance += (other.at(places) - force) ** 2
-        parts[name] = float(np.abs(other.force[:first]).max() - np.abs(mean.force[:first]).max())
+        shifted = tested(name, 1.0 + variation)
+        variance += (shifted.at(places) - force) ** 2
+        parts[name] = float(np.abs(shifted.force[:first]).max() - np.abs(mean.force[:first]).max())
         square += parts[name] ** 2
     z = float(norm.ppf(0.5 * (1.0 + level)))
     return Band(level, places, force, z * np.sqrt(variance), z * float(np.sqrt(square)), parts)

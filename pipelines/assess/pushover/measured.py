@@ -33,12 +33,12 @@ def read_curve(path: Path) -> Array:
         if len(cells) < 2 or any(cell.lower() in _MISSING for cell in cells):
             continue
         try:
-            one, two = map(float, cells)
+            displacement, force = map(float, cells)
         except ValueError as error:
             if rows:
                 raise UsageError("no two numbers", where=f"{path}:{number}", remedy=_FORM) from error
             continue
-        rows.append((one, two))
+        rows.append((displacement, force))
     if not rows:
         raise UsageError("no measured points", where=str(path), remedy=_FORM)
     return np.array(rows) * [1e-3, 1e3]

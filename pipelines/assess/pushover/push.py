@@ -198,11 +198,11 @@ def _in_rig(scene: SceneFile, stones: Scene, groups: Groups, rig: Rig) -> Scene:
 
 def _rig(asked: Pushing) -> tuple[str, ...]:
     """Describe the rig, its push, and the scatter that makes the band."""
-    rig, way = asked.rig, ", ".join(f"{1e3 * to:g}" for to in asked.to)
+    rig, turns = asked.rig, ", ".join(f"{1e3 * to:g}" for to in asked.to)
     scatter = ", ".join(f"{name} {100 * value:g} %" for name, value in asked.scatter.items())
     return (
         f"head {rig.head}, vertical force {1e-3 * rig.load:g} kN, pushed at {rig.height:g} m above the lowest point",
-        f"push along ({', '.join(f'{component:z.4g}' for component in rig.direction)}) to {way} mm in turn",
+        f"push along ({', '.join(f'{component:z.4g}' for component in rig.direction)}) to {turns} mm in turn",
         f"coefficients of variation: {scatter}" if scatter else "no scatter: all values are taken as certain",
     )
 

@@ -64,6 +64,8 @@ def simple_polygons(vertices: Array, polygon: Polygon) -> list[Polygon]:
         if corner in seen:
             start = seen[corner]
             parts = (polygon[start:k], polygon[:start] + polygon[k:])
-            return [polygon for part in parts if len(part) > 2 for polygon in simple_polygons(vertices, part)]
+            return [
+                polygon for piece in parts if len(piece) > 2 for polygon in simple_polygons(vertices, piece)
+            ]
         seen[corner] = k
     return [polygon]

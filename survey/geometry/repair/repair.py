@@ -94,14 +94,14 @@ def repair(vertices: Array, polygons: Sequence[Polygon], tolerance: float) -> Re
     tolerance : distance of corners that are the same, and of corners from an edge that they divide [m]
     """
     joined, deeds = _joined(vertices, list(polygons), tolerance)
-    covers, left, largest = _covers(vertices, joined)
-    if covers and not left and largest is not None:
-        covered = joined + [one for cover in covers for one in cover]
+    covers, uncovered, largest = _covers(vertices, joined)
+    if covers and not uncovered and largest is not None:
+        covered = joined + [polygon for cover in covers for polygon in cover]
         if _crossings(covered) <= _crossings(polygons):
             holes = "1 hole" if len(covers) == 1 else f"{len(covers)} holes"
             text = f"{holes} covered, the largest {largest.text.removeprefix('a hole ')}"
             return Repaired(vertices, covered, (*deeds, text), ())
-    if left or covers:
+    if uncovered or covers:
         size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
         slits = holes_of(vertices, joined)
         widest = max(slit.slit for slit in slits)
@@ -109,8 +109,8 @@ def repair(vertices: Array, polygons: Sequence[Polygon], tolerance: float) -> Re
             zipped, more = _joined(vertices, joined, _REACH * widest)
             if not open_edges(zipped) and _crossings(zipped) == 0:
                 return Repaired(vertices, zipped, (*deeds, *more), ())
-        left = slits
-    return Repaired(vertices, joined, deeds, tuple(sorted(left, key=lambda one: -one.width)))
+        uncovered = slits
+    return Repaired(vertices, joined, deeds, tuple(sorted(uncovered, key=lambda hole: -hole.width)))
 
 
 def _joined(
@@ -184,12 +184,12 @@ def _welds(vertices: Array, edges: Sequence[Edge], tolerance: float) -> tuple[di
     pairs = tree.query_pairs(tolerance, output_type="ndarray")
     if not len(pairs):
         return {}, 0.0
-    far = np.linalg.norm(
+    distance = np.linalg.norm(
         vertices[np.array(corners)[pairs[:, 0]]] - vertices[np.array(corners)[pairs[:, 1]]], axis=1
     )
     root = {i: i for i in corners}
     members = {i: [i] for i in corners}
-    for k in np.argsort(far, kind="stable").tolist():
+    for k in np.argsort(distance, kind="stable").tolist():
         a, b = sorted((_root(root, corners[pairs[k, 0]]), _root(root, corners[pairs[k, 1]])))
         if a == b:
             continue
@@ -254,10 +254,10 @@ def _divisions(
 def _divided(polygon: Polygon, cuts: dict[Edge, list[int]]) -> Polygon:
     """Return a polygon with the corners that divide its edges."""
     ring: list[int] = []
-    own = set(polygon)
+    corners = set(polygon)
     for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
         ring.append(a)
-        ring += [i for i in cuts.get((a, b), ()) if i not in own]
+        ring += [i for i in cuts.get((a, b), ()) if i not in corners]
     return tuple(ring)
 
 
@@ -311,22 +311,22 @@ def _covers(
     loops, holes = _loops(polygons), holes_of(vertices, polygons)
     if loops is None:
         return [], holes, None
-    covers, left, largest = [], [], None
+    covers, uncovered, largest = [], [], None
     directed = set(open_edges(polygons))
     taken = {(min(edge), max(edge)) for polygon in polygons for edge in _edges(polygon)}
     for loop, hole in zip(loops, holes, strict=True):
         if hole.share > _SMALL or len(loop) > _CORNERS or len(loop) < 3:
-            left.append(hole)
+            uncovered.append(hole)
             continue
         ring = loop if (loop[1], loop[0]) in directed else loop[::-1]
         cover = _cover(vertices, ring, taken)
         if cover is None:
-            left.append(hole)
+            uncovered.append(hole)
             continue
         covers.append(cover)
         if largest is None or hole.width > largest.width:
             largest = hole
-    return covers, left, largest
+    return covers, uncovered, largest
 
 
 def _cover(vertices: Array, ring: list[int], taken: set[Edge]) -> list[Polygon] | None:
@@ -334,11 +334,11 @@ def _cover(vertices: Array, ring: list[int], taken: set[Edge]) -> list[Polygon] 
     size = float(np.linalg.norm(np.ptp(vertices[ring], axis=0)))
     if warp(vertices[ring]) <= _FLAT * size:
         return [tuple(ring)]
-    own = {(min(edge), max(edge)) for edge in _edges(tuple(ring))}
+    border = {(min(edge), max(edge)) for edge in _edges(tuple(ring))}
     for start in range(len(ring)):
         turned = tuple(ring[start:] + ring[:start])
-        triangles = [tuple(one) for one in triangulate(Solid("", vertices, (turned,))).tolist()]
-        inner = {(min(edge), max(edge)) for triangle in triangles for edge in _edges(triangle)} - own
+        triangles = [tuple(triangle) for triangle in triangulate(Solid("", vertices, (turned,))).tolist()]
+        inner = {(min(edge), max(edge)) for triangle in triangles for edge in _edges(triangle)} - border
         if inner.isdisjoint(taken):
             return triangles
     return None

@@ -124,8 +124,8 @@ class _Stones:
     def near(self, solid: Solid) -> list[FacingStone]:
         """Return the stones whose box meets that of a solid."""
         low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-        found = np.flatnonzero(((self._low < high) & (self._high > low)).all(axis=1))
-        return [self.stones[i] for i in found.tolist()]
+        meeting = np.flatnonzero(((self._low < high) & (self._high > low)).all(axis=1))
+        return [self.stones[i] for i in meeting.tolist()]
 
 
 class _Cells:
@@ -186,8 +186,8 @@ def _carved(planes: list[Array], stones: _Stones) -> Solid | None:
             return None
         if _apart(solid, planes, stone):
             continue
-        left = [[*planes, -plane] for plane in stone.planes]
-        planes = max(left, key=lambda some: 0.0 if (part := _common(some)) is None else volume_of(part))
+        pieces = [[*planes, -plane] for plane in stone.planes]
+        planes = max(pieces, key=lambda some: 0.0 if (piece := _common(some)) is None else volume_of(piece))
         solid = _common(planes)
     return solid
 

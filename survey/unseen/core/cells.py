@@ -70,12 +70,12 @@ def _rectangles(filled: Bools, side: Node) -> Iterator[tuple[Node, Node]]:
     """Yield the free sides of cells that face one way, merged: first and last cell of each rectangle."""
     padded = np.pad(filled, 1)
     free = (padded & ~np.roll(padded, [-s for s in side], axis=(0, 1, 2)))[1:-1, 1:-1, 1:-1]
-    one, other = (axis for axis in range(3) if side[axis] == 0)
+    along, across = (axis for axis in range(3) if side[axis] == 0)
     for first in np.argwhere(free).tolist():
         if not free[tuple(first)]:
             continue
         last = list(first)
-        for axis in (one, other):
+        for axis in (along, across):
             while last[axis] + 1 < free.shape[axis]:
                 span = [slice(a, b + 1) for a, b in zip(first, last, strict=True)]
                 span[axis] = slice(last[axis] + 1, last[axis] + 2)

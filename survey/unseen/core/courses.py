@@ -157,8 +157,8 @@ def _plane(corners: Array) -> Array:
     return np.append(normal, float(normal @ middle))
 
 
-def _between(one: Array, other: Array, place: float, height: float) -> Array:
+def _between(first: Array, second: Array, place: float, height: float) -> Array:
     """Return the plane half-way between two head joints, through a place at a height."""
-    normal = one[:3] + other[:3]
+    normal = first[:3] + second[:3]
     normal = normal / np.linalg.norm(normal)
     return np.append(normal, float(normal @ np.array([place, height, 0.0])))

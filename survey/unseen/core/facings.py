@@ -194,9 +194,9 @@ def _linked(stones: Sequence[FacingStone], settings: InfillSettings) -> Indices:
     flush = (cosine > parallel) & (np.maximum(np.abs(behind), np.abs(before)) <= _FLUSH) & close
     facing_pairs = [
         pair
-        for pair, one in zip(pairs[across | flush].tolist(), across[across | flush].tolist(), strict=True)
+        for pair, facing in zip(pairs[across | flush].tolist(), across[across | flush].tolist(), strict=True)
         if _overlap(fronts[pair[0]], fronts[pair[1]], normals[pair[0]])
-        > (_SHARED if one else -settings.max_joint)
+        > (_SHARED if facing else -settings.max_joint)
     ]
     return np.array(facing_pairs, dtype=np.intp).reshape(-1, 2)
 
@@ -207,8 +207,8 @@ def _front(stone: FacingStone) -> Array:
     return stone.solid.vertices if face is None else stone.solid.vertices[face]
 
 
-def _overlap(first: Array, other: Array, normal: Array) -> float:
+def _overlap(first: Array, second: Array, normal: Array) -> float:
     """Return the least overlap of the boxes of two faces, along or up, seen square to the first [m]."""
     frame = upright_frame(normal, first[0])
-    a, b = frame.flatten(first), frame.flatten(other)
+    a, b = frame.flatten(first), frame.flatten(second)
     return float((np.minimum(a.max(axis=0), b.max(axis=0)) - np.maximum(a.min(axis=0), b.min(axis=0))).min())

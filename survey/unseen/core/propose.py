@@ -111,8 +111,8 @@ def _storeys(wall: FacingWall, name: str, settings: InfillSettings) -> list[Infi
     storeys = core_storeys(wall, settings)
     proposals = []
     for k, storey in enumerate(storeys):
-        part = sum(other.number == storey.number for other in storeys[:k])
-        code = f"{name}-S{storey.number}" + (f"-{part + 1}" if part else "")
+        before = sum(earlier.number == storey.number for earlier in storeys[:k])
+        code = f"{name}-S{storey.number}" + (f"-{before + 1}" if before else "")
         where = "" if storey.courses is None else f" of courses {storey.courses[0]} to {storey.courses[1]}"
         text = (
             f"core between the hidden sides{where} of {len(wall.front)} and {len(wall.back)} stones of two facings, "

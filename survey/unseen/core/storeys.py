@@ -136,9 +136,9 @@ def _levels(wall: FacingWall, settings: InfillSettings) -> tuple[list[Array], li
         space = (second[3] - corners @ second[:3]) / second[2] - (first[3] - corners @ first[:3]) / first[2]
         return bool((space > -settings.min_thickness).any())
 
-    while len(front) > 1 and any(meet(front[-1], other) for other in back):
+    while len(front) > 1 and any(meet(front[-1], rear) for rear in back):
         front.pop()
-    while len(back) > 1 and any(meet(one, back[-1]) for one in front):
+    while len(back) > 1 and any(meet(level, back[-1]) for level in front):
         back.pop()
     if meet(front[0], back[0]):
         return [], []
@@ -181,7 +181,7 @@ def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...
     planes = [rows[0].lower, *(row.upper for row in rows)]
     if not deep:
         return [(_Line(plane, _TOUCHING),) for plane in planes]
-    spans = np.array([[one.above(plane) for one in deep] for plane in planes])
+    spans = np.array([[stone.above(plane) for stone in deep] for plane in planes])
     lowest, highest = np.abs(spans[:, :, 0]).argmin(axis=0), np.abs(spans[:, :, 1]).argmin(axis=0)
     beds: list[tuple[_Line, ...]] = []
     for k, plane in enumerate(planes):
@@ -266,7 +266,7 @@ def _spans(row: Strip, stones: Sequence[FacingStone], settings: InfillSettings) 
 
 def _places(deep: Sequence[_Deep], covered: Sequence[Sequence[Interval]]) -> list[float]:
     """Return the cuts of the storey along the wall: sides of deeper stones, and ends of a facing."""
-    marks = [(place, kind) for one in deep for place, kind in zip(one.along, (True, False), strict=True)]
+    marks = [(place, kind) for stone in deep for place, kind in zip(stone.along, (True, False), strict=True)]
     ends = sorted(place for spans in covered for span in spans for place in span)
     if not ends:
         return []

@@ -165,7 +165,7 @@ def _along(stone: FlatStone, stones: Sequence[FlatStone]) -> Array:
     """Return the direction of the row at a stone: from its nearest neighbour, or to it."""
     others = sorted(
         (neighbour for neighbour in stones if neighbour is not stone),
-        key=lambda one: float(np.linalg.norm(one.centre - stone.centre)),
+        key=lambda neighbour: float(np.linalg.norm(neighbour.centre - stone.centre)),
     )
     run = others[0].centre - stone.centre
     out: Array = run / np.linalg.norm(run)
@@ -196,8 +196,8 @@ def _side(stone: FlatStone, ends: Ends, opposite: Ends | None, centre: Array) ->
     corners = [
         stone.outline[k]
         if k not in stone.worn
-        else _mended(stone.outline[k], stone.outline[other], line, centre)
-        for k, other in zip((inner, outer), others, strict=True)
+        else _mended(stone.outline[k], stone.outline[opposite_corner], line, centre)
+        for k, opposite_corner in zip((inner, outer), others, strict=True)
     ]
     about = 0.5 * (corners[0] + corners[1]) - centre
     return _Side(line, float(np.arctan2(about[0], about[1])), corners[0], corners[1])

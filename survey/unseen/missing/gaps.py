@@ -104,8 +104,8 @@ def find_gaps(elevation: Elevation, settings: MissingSettings) -> Gaps:
     for (zone, course), members in sorted(courses.items(), key=lambda item: (item[0][1], item[0][0])):
         middle = _middle(members)
         heights = [middle.at_place(place) for place in _ends(members)]
-        near = np.flatnonzero((low < max(heights)) & (high > min(heights))).tolist()
-        for left, right, start, stop in _between([stones[i] for i in near], middle, _ends(members)):
+        crossed = np.flatnonzero((low < max(heights)) & (high > min(heights))).tolist()
+        for left, right, start, stop in _between([stones[i] for i in crossed], middle, _ends(members)):
             if stop - start <= settings.max_joint:
                 joints.append(stop - start)
             elif (
@@ -120,8 +120,8 @@ def find_holes(gaps: Sequence[CourseGap]) -> tuple[Hole, ...]:
     pairs = [
         (i, j)
         for i, gap in enumerate(gaps)
-        for j, other in enumerate(gaps)
-        if i != j and _lies_on(other, gap)
+        for j, above in enumerate(gaps)
+        if i != j and _lies_on(above, gap)
     ]
     rows, columns = ([pair[k] for pair in pairs] for k in (0, 1))
     graph = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(gaps), len(gaps)))
@@ -141,9 +141,9 @@ def opening_signs(hole: Hole, elevation: Elevation) -> tuple[str, ...]:
     for gap in hole.gaps:
         signs += [f"{_FRAMES[kind]} on the left" for kind in [gap.left.block.kind] if kind in _FRAMES]
         signs += [f"{_FRAMES[kind]} on the right" for kind in [gap.right.block.kind] if kind in _FRAMES]
-        for bordering, known, where in ((gap.below, _BELOW, "below"), (gap.above, _ABOVE, "above")):
+        for bordering, frames, where in ((gap.below, _BELOW, "below"), (gap.above, _ABOVE, "above")):
             kinds = [elevation.stones[i].block.kind for i in bordering.tolist() if i >= 0]
-            framing = [known[kind] for kind in kinds if kind in known]
+            framing = [frames[kind] for kind in kinds if kind in frames]
             if 2 * len(framing) > len(bordering):
                 signs.append(f"{framing[0]} {where}")
     return tuple(dict.fromkeys(signs))
@@ -223,7 +223,7 @@ def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float
         return None
     heights = np.array([ends[:, 1].mean() for ends in edges])
     usual = np.abs(heights - np.median(heights)) <= _SAME_BED
-    return _fitted(np.concatenate([ends for ends, one in zip(edges, usual, strict=True) if one][:_AROUND]))
+    return _fitted(np.concatenate([ends for ends, fits in zip(edges, usual, strict=True) if fits][:_AROUND]))
 
 
 def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> Ints:
@@ -231,8 +231,8 @@ def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> 
     stone_at = np.full(len(places), -1, dtype=np.int64)
     points = np.array([[place, bed.at_place(place) + above] for place in places.tolist()])
     boxes = elevation.boxes
-    near = (boxes[:, 0] < points.max(axis=0)) & (boxes[:, 1] > points.min(axis=0))
-    for number in np.flatnonzero(near.all(axis=1)).tolist():
+    boxed = (boxes[:, 0] < points.max(axis=0)) & (boxes[:, 1] > points.min(axis=0))
+    for number in np.flatnonzero(boxed.all(axis=1)).tolist():
         stone = elevation.stones[number]
         for k in np.flatnonzero(stone_at < 0).tolist():
             if stone.contains(points[k]):
@@ -259,11 +259,11 @@ def _bounded(gap: CourseGap, hole: Sequence[CourseGap]) -> float:
     """Return the least part of a gap's length with stones, the ground or another gap of its hole, below or above."""
     places = gap.start + (np.arange(_SAMPLES) + 0.5) / _SAMPLES * gap.width
     parts = []
-    for found, others in (
-        (gap.below, [one for one in hole if _lies_on(gap, one)]),
-        (gap.above, [one for one in hole if _lies_on(one, gap)]),
+    for bordering, others in (
+        (gap.below, [lower for lower in hole if _lies_on(gap, lower)]),
+        (gap.above, [upper for upper in hole if _lies_on(upper, gap)]),
     ):
-        filled = found != -1
+        filled = bordering != -1
         for neighbour in others:
             filled |= (places > neighbour.start) & (places < neighbour.stop)
         parts.append(float(filled.mean()))

@@ -109,13 +109,15 @@ def likeliest(
     candidates = []
     for count in range(1, settings.max_stones + 2):
         for some in combinations_with_replacement(kinds, count):
-            sigma = math.sqrt(sum(one.sigma**2 for one in some))
-            off = (width - (count + 1) * joint - sum(one.length for one in some)) / sigma
+            sigma = math.sqrt(sum(kind.sigma**2 for kind in some))
+            off = (width - (count + 1) * joint - sum(kind.length for kind in some)) / sigma
             orders = math.factorial(count) / math.prod(
-                math.factorial(n) for n in Counter(one.kind for one in some).values()
+                math.factorial(n) for n in Counter(kind.kind for kind in some).values()
             )
-            prior = _FURTHER ** (count - 1) * orders * math.prod(one.share for one in some)
-            candidates.append((math.log(prior / sigma) - 0.5 * off**2, off, tuple(one.kind for one in some)))
+            prior = _FURTHER ** (count - 1) * orders * math.prod(kind.share for kind in some)
+            candidates.append(
+                (math.log(prior / sigma) - 0.5 * off**2, off, tuple(kind.kind for kind in some))
+            )
     if not candidates:
         return None
     best = max(candidates)
@@ -174,8 +176,8 @@ def depth_of_kind(
 def _joints_around(gap: CourseGap, elevation: Elevation) -> Array:
     """Return the ends of the stones above and below a gap, along the wall [m]."""
     places = []
-    for found in (gap.below, gap.above):
-        for i in sorted({i for i in found.tolist() if i >= 0}):
+    for bordering in (gap.below, gap.above):
+        for i in sorted({i for i in bordering.tolist() if i >= 0}):
             outline = elevation.stones[i].outline
             places += [float(outline[:, 0].min()), float(outline[:, 0].max())]
     return np.array([place for place in places if gap.start < place < gap.stop])

@@ -130,10 +130,10 @@ def _is_there(proposal: SurveyedBlock, others: Sequence[SurveyedBlock]) -> bool:
     outline = proposal.face.outline
     middle = outline.mean(axis=0) - _BEHIND * proposal.face.fit.normal
     places = np.concatenate([[middle], 0.5 * (middle + outline - _BEHIND * proposal.face.fit.normal)])
-    for other in others:
-        corners = other.solid.vertices
+    for stone in others:
+        corners = stone.solid.vertices
         if (corners.min(axis=0) <= middle).all() and (middle <= corners.max(axis=0)).all():
-            polygons = [corners[list(face)] for face in other.solid.faces]
+            polygons = [corners[list(face)] for face in stone.solid.faces]
             inside = [((places - polygon.mean(axis=0)) @ area_vector(polygon) <= 0.0) for polygon in polygons]
             if 2 * int(np.all(inside, axis=0).sum()) > len(places):
                 return True
@@ -214,7 +214,10 @@ def _of_courses(elevation: Elevation, settings: MissingSettings, codes: _FreeCod
         fillings = [likeliest(gap.width, joint, kinds, settings) for gap in hole.gaps]
         tall = _is_tall(hole)
         filled = [filling for filling in fillings if filling is not None]
-        if len(filled) < len(fillings) or sum(len(one.kinds) for one in filled) > settings.max_stones + tall:
+        if (
+            len(filled) < len(fillings)
+            or sum(len(fill.kinds) for fill in filled) > settings.max_stones + tall
+        ):
             continue
         pairs = list(zip(hole.gaps, filled, strict=True))
         for gap, filling in pairs[:1] if tall else pairs:
@@ -315,8 +318,8 @@ class _Fill:
     def _kind(self, kind: str) -> str:
         """Return the kind by length; between a stone of an arch and one of the wall, a springer."""
         arch = [stone.block.kind in ("voussoir", "keystone") for stone in (self.gap.left, self.gap.right)]
-        known = any(stone.block.kind == "springer" for stone in self.elevation.stones)
-        return "springer" if known and any(arch) and not all(arch) else kind
+        springers = any(stone.block.kind == "springer" for stone in self.elevation.stones)
+        return "springer" if springers and any(arch) and not all(arch) else kind
 
     def _outlines(self, cuts: Sequence[float]) -> Iterator[Array]:
         first, last = _sides(self.gap, self.upper, self.joint)
@@ -326,8 +329,8 @@ class _Fill:
                 Line(np.array([cut + by, 0.0]), _UPRIGHT) for by in (-0.5 * self.joint, 0.5 * self.joint)
             ]
         lines.append(last)
-        for line, other in zip(lines[::2], lines[1::2], strict=True):
-            yield _quadrilateral(line, other, self.gap.lower, self.upper)
+        for line, next_line in zip(lines[::2], lines[1::2], strict=True):
+            yield _quadrilateral(line, next_line, self.gap.lower, self.upper)
 
     def _evidence(self, kind: str) -> str:
         gap = self.gap

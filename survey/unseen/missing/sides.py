@@ -40,9 +40,9 @@ class Line:
         return float(self.point[1] + (place - self.point[0]) * self.direction[1] / self.direction[0])
 
 
-def line_through(first: Array, other: Array) -> Line:
+def line_through(first: Array, second: Array) -> Line:
     """Return the line through two points."""
-    run = other - first
+    run = second - first
     return Line(first, run / np.linalg.norm(run))
 
 
