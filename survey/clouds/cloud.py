@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ground.errors import GeometryError, SurveyError, UsageError
+from ground.tables.columns import UNITS
 from survey.arrays import Array
 from survey.clouds._kernels.planes import COVERED, FEW, FINE, Rules, fit_patches, patch_sigmas
 from survey.clouds.collecting import Collected, collect_points
@@ -144,6 +145,10 @@ def _margins(placed: Sequence[PlacedOutline], sigmas: Array, margin: float | Non
     return np.minimum(wanted, _ROOM * width)
 
 
+def _size(outline: PlacedOutline) -> float:
+    return float(np.ptp(outline.ring, axis=0).max())
+
+
 def _apart(
     near: Array, placed: Sequence[PlacedOutline], collected: Collected, options: CloudOptions
 ) -> SurveyError:
@@ -152,6 +157,16 @@ def _apart(
     cloud = f"about ({', '.join(f'{one:.2f}' for one in near)})"
     what = f"none of its {collected.read} points lies in an outline: outlines lie {where}, the cloud {cloud}"
     remedy = f"check --wall, the world file and units; points count up to {options.slab:g} m from the plane (--slab)"
+    reach = (
+        options.slab + float(np.ptp([one.origin for one in placed], axis=0).max()) + max(map(_size, placed))
+    )
+    for unit, length in UNITS.items():
+        if length != 1.0 and np.linalg.norm(length * near - middle) <= reach < np.linalg.norm(near - middle):
+            remedy = (
+                f"in {unit} it would lie there: export it in metres, or begin a text with the units of its columns, "
+                f"e.g. x[{unit}] y[{unit}] z[{unit}]"
+            )
+            break
     return SurveyError(what, where=str(options.outlines), remedy=remedy)
 
 
