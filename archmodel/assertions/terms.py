@@ -74,14 +74,19 @@ def declare_term(
         return RowCounts(unchanged=1)
     row = Term(vocabulary=of, name=name, **values)
     words.add(name, meaning or VOCABULARIES[of][0].get(name), values["broader"], values["labels"])
-    if current is not None:
-        supersede(session, entry, current, row)
-    else:
-        row.entry_id = entry.id
-        session.add(row)
+    outcome = _store(session, entry, current, row)
     if alone:
         keep(session, words)
-    return RowCounts(new=1) if current is None else RowCounts(replaced=1)
+    return outcome
+
+
+def _store(session: Session, entry: Entry, current: Term | None, row: Term) -> RowCounts:
+    if current is not None:
+        supersede(session, entry, current, row)
+        return RowCounts(replaced=1)
+    row.entry_id = entry.id
+    session.add(row)
+    return RowCounts(new=1)
 
 
 def _held(session: Session, of: str, name: str) -> Term | None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.moma.commands import invoke
+from tests.moma.commands import answer, fails, invoke
 from tests.paths import ROOT
 
 CASES = ROOT.parent / "shared/cases"
@@ -148,3 +148,48 @@ def test_photographs(tmp_path, project, answers):
     done = invoke("orient", folder / Path(project).name, "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     assert all(answer in done.output for answer in answers), done.output
+
+
+@pytest.mark.parametrize("cloud", ["idpose.e57", "idpose.xyz"])
+def test_an_identity_pose_is_no_station(tmp_path, cloud):
+    folder, url = PHOTOGRAPHS / "e57-identity-pose", f"sqlite:///{tmp_path}/a.db"
+    drawn = ["--outlines", folder / "front.geojson", "--header", folder / "head.moma"]
+    done = invoke("ingest", "--cloud", folder / cloud, *drawn, "--db", url)
+    assert "2 stones" in done.output
+    places = [float(row["y"]) for row in answer("query", "entity", "--columns", "y", "--db", url)]
+    assert places == pytest.approx([-9.79, -9.77], abs=2e-3)  # behind a face at -9.99 that looks towards -y
+
+
+@pytest.mark.parametrize(
+    ("file", "advice", "stones"),
+    [
+        (["b_mm.stl"], ["--unit", "mm"], 4),
+        (["y_up.obj"], ["--up", "y"], 9),
+        (["--outlines", "h_mm_unitless.dxf", "--depth", "0.4"], ["--unit", "mm"], 12),
+    ],
+)
+def test_advice_on_unit_and_axis_is_followed_as_copied(tmp_path, file, advice, stones):
+    folder = WILD / "unit-advice-cannot-be-followed"
+    words = [folder / word if "." in word and word != "0.4" else word for word in file]
+    words += ["--db", f"sqlite:///{tmp_path}/a.db"]
+    assert f"give {' '.join(advice)}" in fails(1, "ingest", *words)
+    assert f"{stones} stones" in invoke("ingest", *words, *advice).output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("project", "answers"),
+    [
+        (
+            "metashape-components/comp_free.toml",
+            ["σ₀ 0.974", "station ± 1.6 mm", "moma ingest asks for them"],
+        ),
+        ("metashape-accuracy/acc.toml", ["σ₀ 0.963", "datum: control points"]),
+        ("colmap-binary/bin.toml", ["4800 marks", "12 photographs"]),
+    ],
+)
+def test_projects_of_other_programs(tmp_path, project, answers):
+    folder = shutil.copytree((PHOTOGRAPHS / project).parent, tmp_path / "p")
+    done = invoke("orient", folder / Path(project).name, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert all(text in done.output for text in answers), done.output
