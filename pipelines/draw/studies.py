@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import new_sheet
 
-__all__ = ["draw_fragility", "draw_samples", "draw_shares", "draw_tornado"]
+__all__ = ["draw_fragility", "draw_samples", "draw_shares", "draw_tornado", "draw_weighted"]
 
 _BLUE, _RED, _GREY = "#1f5f8b", "#8a3b12", "#b0b0b0"
 _MAX_BARS = 15  # bars of a tornado
@@ -32,8 +32,26 @@ def draw_samples(path: Path, name: str, values: Array, level: float | None) -> N
     figure.savefig(path)
 
 
-def draw_fragility(path: Path, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Draw the probability of failure at levels, with its interval."""
+def draw_weighted(path: Path, name: str, values: Array, weights: Array, level: float | None) -> None:
+    """Draw samples (m,) about design points as bars: how many there are, and the probability that they stand for."""
+    finite = np.isfinite(values)
+    figure = new_sheet((7.0, 3.8))
+    axes = figure.subplots()
+    _, edges, _ = axes.hist(values[finite], bins="auto", color=_GREY)
+    axes.set_xlabel(name)
+    axes.set_ylabel("samples")
+    shares, _ = np.histogram(values[finite], edges, weights=weights[finite] / len(values))
+    stands = axes.twinx()
+    stands.stairs(shares, edges, color=_BLUE)
+    stands.set_ylabel("probability [-]")
+    stands.set_ylim(bottom=0.0)
+    if level is not None:
+        axes.axvline(level, color=_RED, linestyle="--")
+    figure.savefig(path)
+
+
+def draw_fragility(path: Path, name: str, rows: Sequence[Mapping[str, Any]], small: bool) -> None:
+    """Draw the probability of failure at levels, with its interval; small ones on a logarithmic axis."""
     figure = new_sheet((7.0, 3.8))
     axes = figure.subplots()
     level = [row["level"] for row in rows]
@@ -43,7 +61,10 @@ def draw_fragility(path: Path, name: str, rows: Sequence[Mapping[str, Any]]) -> 
     axes.plot(level, [row["probability"] for row in rows], color=_BLUE)
     axes.set_xlabel(f"level of {name}")
     axes.set_ylabel("probability of failure [-]")
-    axes.set_ylim(0.0, 1.0)
+    if small:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0.0, 1.0)
     axes.grid(alpha=0.3)
     figure.savefig(path)
 

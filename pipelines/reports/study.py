@@ -4,13 +4,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import percent, picture, scientific, write_page
+from pipelines.reports.html import percent, picture, write_page
 
 __all__ = ["write_study"]
 
 _CAPTIONS = {
     "histogram": "Samples of the quantity, and the share of them that is below each value.",
-    "fragility": "Probability of failure at each level, with its interval.",
+    "weighted": "Samples about the design points (grey), and the probability that they stand for (line).",
+    "fragility": "Probability of failure at each level, the cumulative curve, with its interval.",
     "tornado": "Share of the variance by what the stones have in common, and by the scatter of each.",
     "elevation": "Variance that the best measurement of each stone would take away.",
 }
@@ -62,18 +63,18 @@ def _numbers(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
                 "Fails",
                 f"{summary['quantity']} {'above' if failure['above'] else 'below'} {failure['level']:g}",
             ),
-            ("Probability of failure", scientific(failure["probability"])),
-            ("… if all samples without an answer fall", scientific(failure["probability_upper"])),
+            ("Probability of failure", f"{failure['probability']:.3g}"),
+            ("… if all samples without an answer fall", f"{failure['probability_upper']:.3g}"),
             (
                 f"Interval of {100 * study['confidence']:g} %",
-                f"{scientific(failure['low'])} to {scientific(failure['high'])}",
+                f"{failure['low']:.3g} to {failure['high']:.3g}",
             ),
             (
                 "Reliability index β",
                 f"{failure['index']:.3f} ({failure['index_low']:.3f} to {failure['index_high']:.3f})",
             ),
             (
-                "Samples",
+                "Samples about the design points" if summary["designs"] else "Samples",
                 f"{failure['count']}, of which {failure['failing']} fail and {failure['unknown']} have no answer",
             ),
         ]
@@ -82,7 +83,7 @@ def _numbers(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         if mean["sigma"] is not None:
             rows.append((f"Standard deviation of {name}", f"{mean['sigma']:.4g}"))
     linear = summary["linear"]
-    if linear is not None:
+    if linear is not None and not summary["designs"]:
         rows.append(
             ("First order at the mean", f"{linear['mean']:.4g}, standard deviation {linear['sigma']:.4g}")
         )
@@ -101,10 +102,12 @@ def _sorted(shares: Mapping[str, float]) -> list[tuple[str, float]]:
 
 def _design(number: int, design: Mapping[str, Any]) -> tuple[str, str, str, str]:
     stands = "" if design["converged"] else " NOT CONVERGED"
-    values = ", ".join(f"{row['label']} {row['value']:.4g}" for row in design["unknowns"][:4])
+    values = ", ".join(
+        f"{row['label']} {row['value']:.4g} ({row['sigmas']:+.2f} σ)" for row in design["unknowns"][:4]
+    )
     return (
         str(number),
         f"{design['index']:.3f}{stands}",
-        scientific(design["probability"]),
+        f"{design['probability']:.3g}",
         values,
     )

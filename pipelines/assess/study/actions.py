@@ -14,7 +14,7 @@ from mechanics.arrays import Array
 from pipelines.assess.study.problem import Problem
 from pipelines.assess.study.settings import InputType
 
-__all__ = ["Action", "actions", "shares_by_group", "shares_by_input", "shares_by_stone"]
+__all__ = ["SLIGHT", "Action", "actions", "shares_by_group", "shares_by_input", "shares_by_stone"]
 
 _JOINTS = {
     InputType.FRICTION: "sliding tests of friction",
@@ -31,7 +31,8 @@ _WORDS = {
     InputType.RECORD: "state the earthquake",
     InputType.STATION: "measure the stations against one another",
 }
-_MIN_SHARE = 1e-12  # share of the variance that is worth a line [-]
+SLIGHT = 5e-4
+"""Share of the variance that is printed as 0.0 %, so that it is worth no line [-]."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def actions(problem: Problem, gradient: Array) -> list[Action]:
     found = [
         Action(text, stone, share)
         for text, stone, numbers in _measurable(problem)
-        if (share := _taken(problem, gradient, numbers) / total) > _MIN_SHARE
+        if (share := _taken(problem, gradient, numbers) / total) > 0.0
     ]
     return sorted(found, key=lambda action: (-action.share, action.text))
 

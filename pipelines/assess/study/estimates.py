@@ -1,7 +1,7 @@
 """Estimates of a study by its method: moments, probability of failure, shares of the variance, fragility curve."""
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from pipelines.assess.study.methods.counting import (
 )
 from pipelines.assess.study.methods.design_points import Design, design_points
 from pipelines.assess.study.methods.failure import Failure
-from pipelines.assess.study.methods.first_order import FirstOrder, first_order
+from pipelines.assess.study.methods.first_order import FirstOrder, first_order, regressed
 from pipelines.assess.study.methods.importance import importance
 from pipelines.assess.study.methods.plans import latin_hypercube, monte_carlo
 from pipelines.assess.study.methods.sobol import Indices, sobol
@@ -31,8 +31,6 @@ from pipelines.assess.workers.store import Sample
 __all__ = ["Estimates", "estimated", "failure_of"]
 
 _CURVE = 21  # levels of a fragility curve that are not given
-_FEW = 3
-"""Samples for each unknown from which a regression tells shares of the variance."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Estimates:
     designs : design points, the most probable first
     subset : of subset simulation
     indices : of Sobol'
-    squares : (n,) squares of the gradient that tells shares of the variance, by unknown
+    weights : (m,) of samples about design points; None where all count the same
     gradient : (n,) the gradient; None where only shares of inputs are known
     """
 
@@ -64,6 +62,7 @@ class Estimates:
     designs: tuple[Design, ...] = ()
     subset: Subset | None = None
     indices: Indices | None = None
+    weights: Array | None = None
     gradient: Array | None = None
 
 
@@ -143,7 +142,7 @@ def _counted(
         None if failure is None else probability(failure.states(samples), study.confidence),
         fragility(values[first], levels, above, study.confidence),
         linear,
-        gradient=linear.gradient if linear is not None else _regressed(points, values[first]),
+        gradient=linear.gradient if linear is not None else regressed(points, values[first]),
     )
 
 
@@ -173,16 +172,6 @@ def _levels(values: Array) -> tuple[float, ...]:
     if not len(known):
         return ()
     return tuple(np.linspace(known.min(), known.max(), _CURVE).tolist())
-
-
-def _regressed(points: Array, values: Array) -> Array | None:
-    """Return the gradient (n,) of a linear regression; None where there are too few samples."""
-    known = np.isfinite(values)
-    if int(known.sum()) < _FEW * (points.shape[1] + 1):
-        return None
-    design = np.column_stack([np.ones(int(known.sum())), points[known]])
-    found, *_ = np.linalg.lstsq(design, values[known], rcond=None)
-    return found[1:].astype(np.float64)
 
 
 def _first_order(
@@ -224,13 +213,24 @@ def _form(
             f"{failure.quantity} has no gradient from which a design point follows",
             remedy="give method = 'subset'",
         )
-    found = importance(sampler.divided, failure, designs, study.samples, study.seed, study.confidence)
-    name = failure.quantity
+    found = importance(sampler.divided, designs, study.samples, study.seed)
+    name, values = failure.quantity, _values(problem, found.samples)
+    levels = problem.quantities[0].levels or found.levels(values[name], _CURVE)
+    curve = [(level, found.probability(replace(failure, level=level), study.confidence)) for level in levels]
     means = {} if linear is None else {name: Estimate(linear.mean, linear.sigma, np.nan, np.nan, 1)}
     # that of the quantity itself, not of g
     gradient = failure.sign * designs[0].gradient
     return Estimates(
-        np.zeros((0, problem.dimension)), {}, [], means, found, [], linear, designs, gradient=gradient
+        found.points,
+        values,
+        found.samples,
+        means,
+        found.probability(failure, study.confidence),
+        curve,
+        linear,
+        designs,
+        weights=found.ratios,
+        gradient=gradient,
     )
 
 
@@ -248,13 +248,16 @@ def _subset(
 ) -> Estimates:
     assert failure is not None
     found = subset(sampler, failure, problem.dimension, study.samples, study.seed, study.confidence)
+    # the first level is of independent samples, as those of Monte Carlo
+    values = failure.level + failure.sign * found.states
+    curve = [(failure.level + failure.sign * state, one) for state, one in found.curve]
     return Estimates(
         np.zeros((0, problem.dimension)),
-        {},
+        {failure.quantity: values},
         [],
-        {},
+        {failure.quantity: mean_of(values, study.confidence)},
         found.probability,
-        [],
+        sorted(curve, key=lambda row: row[0]),
         linear,
         subset=found,
         gradient=None if linear is None else linear.gradient,

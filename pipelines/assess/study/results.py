@@ -10,7 +10,13 @@ from mechanics.arrays import Array
 from pipelines.assess.study.estimates import Estimates
 from pipelines.assess.study.problem import Problem
 from pipelines.assess.study.summary import INDEX
-from pipelines.draw.studies import draw_fragility, draw_samples, draw_shares, draw_tornado
+from pipelines.draw.studies import (
+    draw_fragility,
+    draw_samples,
+    draw_shares,
+    draw_tornado,
+    draw_weighted,
+)
 from pipelines.reports.study import write_study
 from pipelines.results.checkpoints import write_whole
 from pipelines.results.summary import as_json
@@ -25,6 +31,8 @@ def write_results(folder: Path, summary: dict[str, Any], problem: Problem, found
     write_whole(folder / "actions.csv", _csv([("measurement", "stone", "share"), *measures]))
     names = list(found.values)
     rows = np.column_stack([found.values[name] for name in names]).tolist() if names else []
+    if found.weights is not None:
+        names, rows = [*names, "weight"], np.column_stack([rows, found.weights]).tolist()
     table: list[tuple[Any, ...]] = [("number", *names)]
     table += [(number, *row) for number, row in enumerate(rows)]
     write_whole(folder / "samples.csv", _csv(table))
@@ -39,12 +47,16 @@ def _drawn(folder: Path, summary: Mapping[str, Any], problem: Problem, found: Es
     names, failure = [], summary["failure"]
     name = summary["quantity"]
     if name in found.values and np.isfinite(found.values[name]).sum() > 1:
-        draw_samples(
-            folder / "histogram.png", name, found.values[name], None if failure is None else failure["level"]
-        )
-        names.append("histogram.png")
+        level = None if failure is None else failure["level"]
+        if found.weights is None:
+            names.append("histogram.png")
+            draw_samples(folder / names[-1], name, found.values[name], level)
+        else:
+            names.append("weighted.png")
+            draw_weighted(folder / names[-1], name, found.values[name], found.weights, level)
     if len(summary["fragility"]) > 1:
-        draw_fragility(folder / "fragility.png", name, summary["fragility"])
+        small = found.weights is not None or found.subset is not None
+        draw_fragility(folder / "fragility.png", name, summary["fragility"], small)
         names.append("fragility.png")
     if found.gradient is not None:
         draw_tornado(folder / "tornado.png", summary["shares"]["by_group"])

@@ -2,7 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,7 @@ from pipelines.assess.study.settings import InputType, Method
 from pipelines.assess.study.summary import summary_of
 from pipelines.assess.workers.cluster import cluster
 from pipelines.assess.workers.pool import workers
-from pipelines.assess.workers.store import Snapshot
+from pipelines.assess.workers.store import SAMPLES, Snapshot
 from pipelines.draw.elevations.sheet import require_figures
 from pipelines.results.folder import locked
 from pipelines.run.record import store_record, versions
@@ -99,13 +101,16 @@ def run_study(
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
         content = None if resume else snapshot_content(file, session)
+    begins = not any(folder.glob(_SNAPSHOTS))
     # workers elsewhere stand in another folder
     snapshot = _snapshot(folder.absolute(), content, overwrite)
-    problem = problem_of(snapshot)
+    with _forgotten(snapshot, begins), file.document.at("correlations" if file.correlations else "inputs"):
+        problem = problem_of(snapshot)
     crew = workers(count, take, ATTEMPTS) if scheduler is None else cluster(scheduler, take, ATTEMPTS)
     with crew as run:
         sampler = Sampler(snapshot, run, part, progress)
-        _refuse_fallen(file, problem, sampler)
+        with _forgotten(snapshot, begins):
+            _refuse_fallen(file, problem, sampler)
         try:
             estimates = estimated(file.study, problem, sampler)
         except IncompleteError as error:
@@ -158,6 +163,18 @@ def _snapshot(folder: Path, content: dict[str, Any] | None, overwrite: bool) -> 
             remedy="name another folder, go on with that study by --resume, or keep both by --overwrite",
         )
     return Snapshot.write(folder, content)
+
+
+@contextmanager
+def _forgotten(snapshot: Snapshot, begins: bool) -> Iterator[None]:
+    """Empty the folder of a study that begins in it and is refused, so that it can be mended and asked for again."""
+    try:
+        yield
+    except SceneError:
+        if begins:
+            snapshot.path.unlink(missing_ok=True)
+            shutil.rmtree(snapshot.folder / SAMPLES, ignore_errors=True)
+        raise
 
 
 def _refuse_fallen(file: StudyFile, problem: Problem, sampler: Sampler) -> None:

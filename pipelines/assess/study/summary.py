@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.assess.study.actions import (
+    SLIGHT,
     actions,
     shares_by_group,
     shares_by_input,
@@ -40,6 +41,7 @@ def summary_of(
     gradient = estimates.gradient
     squares = np.zeros(problem.dimension) if gradient is None else gradient**2
     measures = [] if gradient is None else actions(problem, gradient)
+    worth = [action for action in measures if action.share >= SLIGHT][:_MOST]
     summary: dict[str, Any] = {
         "scene": file.scene.name,
         "study": asdict(file.study),
@@ -50,6 +52,7 @@ def summary_of(
         "quantiles": {
             name: dict(zip(map(str, _SHARES), quantiles(values, _SHARES), strict=True))
             for name, values in estimates.values.items()
+            if estimates.weights is None
         },
         "failure": _failure(problem, estimates),
         "fragility": [_plain({"level": level, **_told(one)}) for level, one in estimates.fragility],
@@ -68,7 +71,7 @@ def summary_of(
             "by_group": shares_by_group(problem, squares),
             "by_stone": dict(shares_by_stone(problem, measures)),
         },
-        "actions": [asdict(action) for action in measures[:_MOST]],
+        "actions": [asdict(action) for action in worth],
         "certain": certain(problem),
         "faults": [{"reason": first, "count": many} for first, many in sampler.faults.values()],
         "samples": {
@@ -141,6 +144,7 @@ def _linear(problem: Problem, estimates: Estimates) -> dict[str, Any] | None:
 def _design(problem: Problem, design: Any) -> dict[str, Any]:
     values = problem.unknowns.values(design.point)
     order = np.argsort(-design.shares, kind="stable")[:12]
+    order = order[design.shares[order] >= SLIGHT]
     return {
         "index": design.index,
         "probability": design.probability,
@@ -150,6 +154,7 @@ def _design(problem: Problem, design: Any) -> dict[str, Any]:
             {
                 "label": problem.unknowns.each[number].label,
                 "value": float(values[number]),
+                "sigmas": float(design.point[number]),
                 "share": float(design.shares[number]),
             }
             for number in order.tolist()
@@ -224,7 +229,8 @@ def _cautions(problem: Problem, estimates: Estimates, summary: Mapping[str, Any]
 
 def _departing(estimates: Estimates) -> list[str]:
     """Return a caution where the interval of the samples is not that of the first-order prediction."""
-    if estimates.linear is None and estimates.gradient is None:
+    nothing = estimates.linear is None and estimates.gradient is None
+    if nothing or estimates.weights is not None:
         return []
     told = []
     for name, values in estimates.values.items():

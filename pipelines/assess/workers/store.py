@@ -18,9 +18,11 @@ from ground.errors import UsageError, storing
 from mechanics.arrays import Array
 from pipelines.results.checkpoints import write_shared
 
-__all__ = ["Sample", "SampleStore", "Snapshot"]
+__all__ = ["SAMPLES", "Sample", "SampleStore", "Snapshot"]
 
-_SNAPSHOT, _SAMPLES = "snapshot-{}.json", "samples"
+_SNAPSHOT = "snapshot-{}.json"
+SAMPLES = "samples"
+"""Folder of the records."""
 _DIGITS = 24  # of a digest in a file's name: two of 10⁹ samples share it with a probability of 10⁻¹¹
 
 
@@ -155,7 +157,7 @@ class SampleStore:
         )
         name = digest.hexdigest()[:_DIGITS]
         # 256 folders, as file systems slow down with 10⁵ files in a folder
-        return self.snapshot.folder / _SAMPLES / name[:2] / f"{name}.json"
+        return self.snapshot.folder / SAMPLES / name[:2] / f"{name}.json"
 
 
 def _write(path: Path, content: bytes) -> None:

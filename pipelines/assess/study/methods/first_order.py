@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate
 
-__all__ = ["NOT_LINEAR", "FirstOrder", "Sides", "first_order"]
+__all__ = ["NOT_LINEAR", "FirstOrder", "Sides", "first_order", "regressed"]
 
 _MOST = 8
 """Unknowns that the linear prediction is tried along, the largest first."""
@@ -18,12 +18,14 @@ NOT_LINEAR = 0.1
 A tenth shifts a mean by a twentieth of the standard deviation at most.
 """
 
-
 _BESIDE = 1e-3
 """Distance from the mean at which derivatives of either side are taken, in standard deviations [-].
 
 A second mechanism within 10⁻⁶ of a limit load takes over nearer than that: λ moves by 5·10⁻⁵ of itself.
 """
+
+_FEW = 3
+"""Samples for each unknown from which a regression tells shares of the variance."""
 
 
 @dataclass(frozen=True)
@@ -114,3 +116,13 @@ def first_order(evaluate: Evaluate, quantity: str, dimension: int, check: bool =
         for row in np.flatnonzero(np.abs(above - below) > NOT_LINEAR * sigma)
     )
     return FirstOrder(mean, sigma, gradient, float(off[worst]), along, 1 + len(points), sides)
+
+
+def regressed(points: Array, values: Array) -> Array | None:
+    """Return the gradient (n,) of a linear regression; None where there are too few samples."""
+    known = np.isfinite(values)
+    if int(known.sum()) < _FEW * (points.shape[1] + 1):
+        return None
+    design = np.column_stack([np.ones(int(known.sum())), points[known]])
+    found, *_ = np.linalg.lstsq(design, values[known], rcond=None)
+    return found[1:].astype(np.float64)

@@ -1,6 +1,7 @@
 """Importance sampling about design points: small probabilities from some hundred samples, without bias."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
@@ -10,27 +11,55 @@ from mechanics.arrays import Array
 from pipelines.assess.study.methods.counting import Probability
 from pipelines.assess.study.methods.design_points import Design
 from pipelines.assess.study.methods.failure import Evaluate, Failure
+from pipelines.assess.workers.store import Sample
 
-__all__ = ["importance"]
+__all__ = ["Weighted", "importance"]
+
+_TAIL = 0.05
+"""Share of the samples below the least level of a curve, and above the largest: beyond, few tell of the next [-]."""
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """Samples about design points.
+
+    Attributes
+    ----------
+    points : (m, n)
+    samples : there
+    ratios : (m,) φ(u) over the density from which each was drawn: a mean of values times these is that of values
+    """
+
+    points: Array
+    samples: list[Sample]
+    ratios: Array
+
+    def probability(self, failure: Failure, confidence: float) -> Probability:
+        """Return the probability of a failure, with its interval."""
+        return _estimate(failure.states(self.samples), self.ratios, confidence)
+
+    def levels(self, values: Array, count: int) -> tuple[float, ...]:
+        """Return levels of a quantity (m,) about which there are samples on both sides."""
+        known = values[np.isfinite(values)]
+        if not len(known):
+            return ()
+        return tuple(np.linspace(*np.quantile(known, [_TAIL, 1.0 - _TAIL]), count).tolist())
 
 
 def importance(
     evaluate: Evaluate,
-    failure: Failure,
     designs: Sequence[Design],
     count: int,
     seed: int,
-    confidence: float,
-) -> Probability:
-    """Return the probability of failure by samples about design points.
+) -> Weighted:
+    """Return samples about design points, with the weights by which they tell probabilities.
 
-    Each sample is drawn about one of the design points, at random by their probabilities, with unit variance.
+    Each is drawn about one of the design points, at random by their probabilities, with unit variance.
 
     Parameters
     ----------
     count : samples
     seed : of the random numbers
-    confidence : of the interval [-]
     """
     weight = np.array([design.probability for design in designs])
     weight = weight / weight.sum()
@@ -40,9 +69,7 @@ def importance(
         random = np.random.default_rng([seed, 2, number])
         which = int(random.choice(len(designs), p=weight))
         points[number] = centres[which] + random.standard_normal(centres.shape[1])
-    states = failure.states(evaluate(points))
-    ratios = _likelihood(points, centres, weight)
-    return _estimate(states, ratios, confidence)
+    return Weighted(points, evaluate(points), _likelihood(points, centres, weight))
 
 
 def _likelihood(points: Array, centres: Array, weight: Array) -> Array:

@@ -32,12 +32,16 @@ class Subset:
     evaluations : samples taken
     levels : of g
     complete : failure was reached
+    curve : levels of g, from the largest to zero, and the probability that g is less
+    states : (m,) g of the first level, which are independent samples
     """
 
     probability: Probability
     evaluations: int
     levels: tuple[float, ...]
     complete: bool
+    curve: tuple[tuple[float, Probability], ...]
+    states: Array
 
 
 def subset(
@@ -51,6 +55,8 @@ def subset(
     states = failure.states(evaluate(points))
     used, missing, share, variance = count, int(np.isnan(states).sum()), 1.0, 0.0
     levels: list[float] = []
+    curve: list[tuple[float, Probability]] = []
+    independent = states
     chains: Ints = np.arange(count)
     for level in range(_LEVELS):
         order = np.argsort(np.where(np.isnan(states), np.inf, states), kind="stable")
@@ -64,8 +70,10 @@ def subset(
         if bound == 0.0:
             failing = int(inside.sum())
             found = _bounded(share * hit, variance, failing, missing, used, confidence)
-            return Subset(found, used, tuple(levels), True)
+            curve.append((0.0, found))
+            return Subset(found, used, tuple(levels), True, tuple(curve), independent)
         share *= hit
+        curve.append((threshold, _bounded(share, variance, int(inside.sum()), missing, used, confidence)))
         levels.append(threshold)
         seeds = order[: int(inside.sum())]
         points, states, chains, lost = _grown(
@@ -73,7 +81,8 @@ def subset(
         )
         used += count - len(seeds)
         missing += lost
-    return Subset(_bounded(share, variance, 0, missing, used, confidence), used, tuple(levels), False)
+    found = _bounded(share, variance, 0, missing, used, confidence)
+    return Subset(found, used, tuple(levels), False, tuple(curve), independent)
 
 
 def _grown(

@@ -1,5 +1,7 @@
 """Methods against closed forms, and the coverage of their intervals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -52,7 +54,7 @@ def test_form_and_importance_sampling_of_a_linear_limit_state(sigma, exact, inde
     (design,) = design_points(samples, FAILS, 20)
     assert samples.taken <= 5
     assert design.index == pytest.approx(index, abs=1e-3)
-    found = importance(samples, FAILS, [design], 1000, 1, 0.95)
+    found = importance(samples, [design], 1000, 1).probability(FAILS, 0.95)
     assert samples.taken <= 1200
     assert found.cov <= 0.10
     assert found.low < exact < found.high
@@ -109,8 +111,64 @@ def test_intervals_of_importance_sampling_cover():
     def covers(seed):
         samples = least_thickness(0.005, 10)
         designs = design_points(samples, FAILS, 10)
-        found = importance(samples, FAILS, designs, 200, seed, 0.95)
+        found = importance(samples, designs, 200, seed).probability(FAILS, 0.95)
         return found.low <= 3.907e-3 <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nearer", [-1.0, 1.0])
+def test_intervals_of_curves_about_design_points_cover(nearer):
+    """The probability at levels a standard deviation off that of the design points, on either side."""
+    level = 0.005 * nearer
+    exact = float(norm.cdf((0.1067 + level - 0.12) / 0.005))
+
+    def covers(seed):
+        samples = least_thickness(0.005, 10)
+        taken = importance(samples, design_points(samples, FAILS, 10), 200, seed)
+        found = taken.probability(Failure("q", level), 0.95)
+        return found.low <= exact <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+@pytest.mark.slow
+def test_intervals_of_importance_sampling_cover_where_samples_have_no_answer():
+    """A twentieth of all points fails to be computed: both bounds contain the truth."""
+
+    def covers(seed):
+        samples = least_thickness(0.005, 2)
+        designs = design_points(samples, FAILS, 2)
+        taken = importance(samples, designs, 200, seed)
+        lost = [
+            Sample(sample.point, {}, "failed", "forced") if abs(sample.point[1]) > 1.96 else sample
+            for sample in taken.samples
+        ]
+        found = replace(taken, samples=lost).probability(FAILS, 0.95)
+        assert found.unknown > 0
+        assert found.low_value <= found.high_value
+        return found.low <= 3.907e-3 <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+@pytest.mark.slow
+def test_intervals_of_counted_probabilities_cover_where_samples_have_no_answer():
+    exact = float(norm.cdf(-1.0))
+
+    def covers(seed):
+        states = monte_carlo(100, 2, seed)
+        found = probability(np.where(np.abs(states[:, 1]) > 1.96, np.nan, states[:, 0] + 1.0), 0.95)
+        return found.low <= exact <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+def test_intervals_of_plain_means_cover():
+    def covers(seed):
+        found = mean_of(monte_carlo(12, 1, seed)[:, 0], 0.95)
+        return found.low <= 0.0 <= found.high
 
     assert repeated(covers) >= COVERED
 
@@ -122,6 +180,19 @@ def test_intervals_of_subset_simulation_cover():
         samples = Function(lambda u: 3.0 - u.sum() / 2.0)
         found = subset(samples, FAILS, 4, 300, seed, 0.95).probability
         return found.low <= exact <= found.high
+
+    assert repeated(covers) >= COVERED
+
+
+@pytest.mark.slow
+def test_intervals_of_the_curve_of_subset_simulation_cover():
+    """At each level that it passes the probability is Φ(level - 3)."""
+
+    def covers(seed):
+        found = subset(Function(lambda u: 3.0 - u.sum() / 2.0), FAILS, 4, 300, seed, 0.95)
+        level, at = found.curve[1]
+        assert len(found.curve) == len(found.levels) + 1
+        return at.low <= float(norm.cdf(level - 3.0)) <= at.high
 
     assert repeated(covers) >= COVERED
 
@@ -138,15 +209,17 @@ def test_indices_of_ishigami():
 
 
 def test_intervals_of_indices_cover():
-    exact = np.array([0.8, 0.2])
+    exact, counts = np.array([0.8, 0.2]), np.zeros((2, 2), dtype=int)
 
     def covers(seed):
         samples = Function(lambda u: 2.0 * u[0] + u[1])
         found = sobol(samples, "q", 2, [[0], [1]], 64, seed, 0.95)
-        ends = found.total_interval
-        return ends[0, 0] <= exact[0] <= ends[0, 1]
+        for number, ends in enumerate((found.first_interval, found.total_interval)):
+            counts[number] += (ends[:, 0] <= exact) & (exact <= ends[:, 1])
 
-    assert repeated(covers) >= COVERED
+    for seed in range(100):
+        covers(seed)
+    assert counts.min() >= COVERED, counts
 
 
 def test_a_slender_block_is_linear_and_breadth_decides():

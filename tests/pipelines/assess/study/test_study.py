@@ -1,5 +1,6 @@
 """Studies of a block that slides at λ = μ or topples at λ = d/h, whichever is less."""
 
+import csv
 import json
 
 import numpy as np
@@ -29,9 +30,18 @@ def test_the_block_has_two_ways_to_fail_and_first_order_is_flagged(place, tmp_pa
     assert [round(design["index"], 3) for design in designs] == [1.667, 3.0]
     assert failure["low"] < 4.908e-2 < failure["high"]
     assert any("first order is not good enough" in text for text in done.summary["cautions"])
-    assert {"report.html", "study.json", "elevation.png", "tornado.png"} <= {
+    assert {"report.html", "study.json", "elevation.png", "tornado.png", "weighted.png", "fragility.png"} <= {
         file.name for file in (tmp_path / "out").iterdir()
     }
+    # the samples about the design points, with what they stand for
+    rows = list(csv.DictReader((tmp_path / "out" / "samples.csv").read_text().splitlines()))
+    told = sum(float(row["weight"]) for row in rows if float(row["bound horizontal y"]) < 0.3) / len(rows)
+    assert told == pytest.approx(failure["probability"], rel=1e-6)
+    curve = done.summary["fragility"]
+    assert [row["level"] for row in curve] == sorted(row["level"] for row in curve)
+    assert curve[0]["probability"] < failure["probability"] < curve[-1]["probability"]
+    # what is printed as 0.0 % is no measurement
+    assert all(action["share"] >= 5e-4 for action in done.summary["actions"])
     assert json.loads((tmp_path / "out" / "study.json").read_text())["headline"].startswith("P(bound")
 
 
@@ -173,7 +183,31 @@ def test_a_scene_that_does_not_stand_at_its_mean_is_refused(place, tmp_path):
     path.write_text(path.read_text().replace("block.toml", "leaning.toml"), encoding="utf-8")
     with pytest.raises(SceneError, match="does not stand at the mean"):
         run_study(path, url, tmp_path / "out")
-    assert not np.any([file.suffix == ".html" for file in (tmp_path / "out").iterdir()])
+    # the folder is as it was, so that the scene can be mended and asked for again
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_an_input_that_cannot_be_is_refused_at_its_line_and_leaves_no_study(place, tmp_path):
+    """Planes have an unknown for each coordinate of each face, which one correlation cannot join to the friction."""
+    folder, url = place
+    correlated = '[[correlations]]\ninputs = ["friction", "plane"]\nvalue = 0.5\n'
+    path = study_file(folder, "monte_carlo", FRICTIONAL, '[[inputs]]\ntype = "plane"\n', BOUND, correlated)
+    with pytest.raises(SceneError, match="has 0 common unknowns") as refused:
+        run_study(path, url, tmp_path / "out")
+    line = path.read_text().splitlines().index("[[correlations]]") + 1
+    assert refused.value.where == f"{path}:{line}"
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_refused_study_leaves_samples_of_one_that_was_begun(place, tmp_path):
+    folder, url = place
+    run_study(study_file(folder, "first_order", FRICTIONAL, BOUND), url, tmp_path / "out")
+    before = sorted(tmp_path.glob("out/samples/*/*"))
+    path = study_file(folder, "first_order", FRICTIONAL.replace("0.03", "0.03\nmean = -0.1"), BOUND)
+    with pytest.raises(SceneError, match="no answer at the mean"):
+        run_study(path, url, tmp_path / "out", overwrite=True)
+    assert before
+    assert set(before) <= set(tmp_path.glob("out/samples/*/*"))
 
 
 def test_shares_of_stones_are_asked_for_in_the_database(place, tmp_path):
