@@ -93,10 +93,7 @@ def run_study(
     """
     require_figures()
     folder, file, part = Path(folder), read_study(path), part or Part()
-    _refuse_parts(file.study.method, part)
-    if scheduler is not None and count > 1:
-        remedy = "give one of the two"
-        raise UsageError("both a scheduler and processes here", where="--workers", remedy=remedy)
+    _refuse_options(file.study.method, part, scheduler, count)
     progress(Progress("blocks", 0, None, "reading the stones"))
     with open_database(url, create=False) as database, database.session(read_only=True) as session:
         as_of = latest_entry(session)
@@ -125,8 +122,11 @@ def run_study(
     return Study(folder, summary, True, number)
 
 
-def _refuse_parts(method: Method, part: Part) -> None:
-    """Refuse a part of the samples of a method whose samples depend on those before."""
+def _refuse_options(method: Method, part: Part, scheduler: str | None, count: int) -> None:
+    """Refuse parts of a method whose samples depend on those before, and workers both here and elsewhere."""
+    if scheduler is not None and count > 1:
+        remedy = "give one of the two"
+        raise UsageError("both a scheduler and processes here", where="--workers", remedy=remedy)
     if part.count > 1 and method in _WHOLE:
         raise UsageError(
             f"{method} has no parts: {_WHOLE[method]}",

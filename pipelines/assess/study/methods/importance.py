@@ -15,9 +15,6 @@ from pipelines.assess.workers.store import Sample
 
 __all__ = ["Weighted", "importance"]
 
-_TAIL = 0.05
-"""Share of the samples below the least level of a curve, and above the largest: beyond, few tell of the next [-]."""
-
 
 @dataclass(frozen=True)
 class Weighted:
@@ -39,11 +36,11 @@ class Weighted:
         return _estimate(failure.states(self.samples), self.ratios, confidence)
 
     def levels(self, values: Array, count: int) -> tuple[float, ...]:
-        """Return levels of a quantity (m,) about which there are samples on both sides."""
+        """Return levels of a quantity (m,): 1/count of the samples is below the least, as much above the largest."""
         known = values[np.isfinite(values)]
         if not len(known):
             return ()
-        return tuple(np.linspace(*np.quantile(known, [_TAIL, 1.0 - _TAIL]), count).tolist())
+        return tuple(np.linspace(*np.quantile(known, [1.0 / count, 1.0 - 1.0 / count]), count).tolist())
 
 
 def importance(
