@@ -197,7 +197,7 @@ def _find_structures(
     context = Context(session, run)
     scope = StructureScope(context, context.alias(Structure))
     refuse_unknown_run(context)
-    conditions = [condition_in(scope, parse(one)) for one in _listed(where)]
+    conditions = [condition_in(scope, parse(text)) for text in _listed(where)]
     refuse_unknown_kinds(session, Structure)
     names = list(STRUCTURE_ATTRIBUTES) if columns is None else columns
     wanted = [column_named(scope, name).label(f"column_{number}") for number, name in enumerate(names)]

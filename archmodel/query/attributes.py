@@ -84,12 +84,14 @@ class Attribute:
 
 def _declared(cls: type[Base], place: Callable[[str], Value], of_run: bool = False) -> Iterator[Attribute]:
     """Yield the attributes that the columns of a class declare, and the named numbers among their values."""
-    declared = {column.name: one for column, one in declared_attributes(cls.__mapper__)}
+    declared = {column.name: attribute for column, attribute in declared_attributes(cls.__mapper__)}
     for column in cls.__mapper__.local_table.columns:
-        if (one := declared.get(column.name)) is not None:
+        if (attribute := declared.get(column.name)) is not None:
             is_truth = isinstance(column.type, Boolean)
             value = place(column.name)
-            yield Attribute(one.name, one.unit, one.definition, value, of_run, one.words, is_truth)
+            yield Attribute(
+                attribute.name, attribute.unit, attribute.definition, value, of_run, attribute.words, is_truth
+            )
         elif cls is EntityResult and column.name == "values":
             for name, quantity in quantities_of("stone").items():
                 if name not in declared:
@@ -163,7 +165,7 @@ _KNOWN = (
         "mark",
         None,
         "name of its mason mark, the first by the alphabet; a comparison is true of any of several",
-        of_marks(lambda said: func.min(said.c.sign)),
+        of_marks(lambda statement: func.min(statement.c.sign)),
         several=any_mark,
         vocabulary="mark",
     ),
@@ -172,7 +174,7 @@ _KNOWN = (
         "severity",
         "-",
         "largest severity observed, from 0 (traces) to 4 (lost, or about to be)",
-        of_observations(lambda said: func.max(said.c.severity)),
+        of_observations(lambda statement: func.max(statement.c.severity)),
     ),
     Attribute("documents", "-", "documents, drawings and photographs that treat it", documents),
     Attribute(
@@ -219,8 +221,8 @@ _COMPUTED = (
 )
 
 ATTRIBUTES: Mapping[str, Attribute] = {
-    one.name: one
-    for one in (*_declared(Entity, of_entity), *_MEASURED, CANON, *_KNOWN, *_RELATED, *_COMPUTED)
+    attribute.name: attribute
+    for attribute in (*_declared(Entity, of_entity), *_MEASURED, CANON, *_KNOWN, *_RELATED, *_COMPUTED)
 }
 """The attributes of every entity by name."""
 
@@ -233,34 +235,34 @@ def attributes_of(session: Session | None = None, kind: type[Entity] | None = No
     session : of a database whose registered kinds count too
     kind : only own attributes that an entity of this kind can have; None: those of all kinds
     """
-    known = dict(ATTRIBUTES)
+    attributes = dict(ATTRIBUTES)
     for name, attribute in own_attributes_of(session, kind).items():
-        known.setdefault(name, attribute)
-    return known
+        attributes.setdefault(name, attribute)
+    return attributes
 
 
 def own_attributes_of(
     session: Session | None = None, kind: type[Entity] | None = None
 ) -> dict[str, Attribute]:
     """Return the attributes that some kinds have of their own, by name; null for entities of other kinds."""
-    known = kinds_in(session, Entity).values()
-    found: dict[str, Attribute] = {}
-    for cls in known:
+    classes = kinds_in(session, Entity).values()
+    attributes: dict[str, Attribute] = {}
+    for cls in classes:
         if kind is None or issubclass(cls, kind):
-            for own in own_attributes(cls).values():
-                found.setdefault(own.name, _own(own))
-    return found
+            for attribute in own_attributes(cls).values():
+                attributes.setdefault(attribute.name, _own(attribute))
+    return attributes
 
 
-def _own(own: StoneAttribute) -> Attribute:
+def _own(attribute: StoneAttribute) -> Attribute:
     """Make the attribute of a kind: in a column or, for a registered kind, in the entity's JSON."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
-        if own.name in Entity.__table__.c:
-            typed: ColumnElement[Any] = scope.entity.c[own.name]
+        if attribute.name in Entity.__table__.c:
+            typed: ColumnElement[Any] = scope.entity.c[attribute.name]
             return typed
-        told = scope.entity.c.own[own.name]
-        said: ColumnElement[Any] = told.as_string() if own.unit is None else told.as_float()
-        return said
+        stored = scope.entity.c.own[attribute.name]
+        converted: ColumnElement[Any] = stored.as_string() if attribute.unit is None else stored.as_float()
+        return converted
 
-    return Attribute(own.name, own.unit, own.definition, value)
+    return Attribute(attribute.name, attribute.unit, attribute.definition, value)

@@ -123,8 +123,8 @@ def of_relations(what: Callable[[FromClause], ColumnElement[Any]], *sides: str, 
             )
             parts.append(chosen.correlate(scope.entity).scalar_subquery())
         total = parts[0]
-        for part in parts[1:]:
-            total = total + part
+        for counted in parts[1:]:
+            total = total + counted
         return total
 
     return value
@@ -135,16 +135,16 @@ def count(rows: FromClause) -> ColumnElement[int]:
     return func.count(rows.c.id)
 
 
-def different_marks(said: FromClause) -> ColumnElement[Any]:
+def different_marks(mark: FromClause) -> ColumnElement[Any]:
     """Count marks by sign and place: what two authors see is one mark."""
-    return func.count(distinct(said.c.sign + literal("\n") + func.coalesce(said.c.place, "")))
+    return func.count(distinct(mark.c.sign + literal("\n") + func.coalesce(mark.c.place, "")))
 
 
 def any_mark(scope: Scope, test: Test) -> ColumnElement[bool]:
     """Test for a mason mark of the entity whose sign passes."""
-    said = scope.context.alias(Statement)
-    marks = select(said.c.id).where(
-        said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said), test(said.c.sign)
+    mark = scope.context.alias(Statement)
+    marks = select(mark.c.id).where(
+        mark.c.entity_id == scope.entity.c.id, mark.c.kind == "mason_mark", held(mark), test(mark.c.sign)
     )
     return marks.correlate(scope.entity).exists()
 
@@ -154,9 +154,9 @@ def of_marks(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         """Return what the mason's marks of a stone say."""
-        said = scope.context.alias(Statement)
-        marks = select(what(said)).where(
-            said.c.entity_id == scope.entity.c.id, said.c.kind == "mason_mark", held(said)
+        mark = scope.context.alias(Statement)
+        marks = select(what(mark)).where(
+            mark.c.entity_id == scope.entity.c.id, mark.c.kind == "mason_mark", held(mark)
         )
         return marks.correlate(scope.entity).scalar_subquery()
 
@@ -168,25 +168,25 @@ def of_observations(what: Callable[[FromClause], ColumnElement[Any]]) -> Value:
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
         """Return what the observations of a stone say."""
-        said, seen = observations_of(
+        statement, seen = observations_of(
             scope.context.alias, scope.entity, scope.context.statements_of_structures("observation")
         )
-        return select(what(said)).where(seen).correlate(scope.entity).scalar_subquery()
+        return select(what(statement)).where(seen).correlate(scope.entity).scalar_subquery()
 
     return value
 
 
 def documents(scope: Scope, run: int | None) -> ColumnElement[int]:
     """Count the documents that the statements about the entity name."""
-    said = scope.context.alias(Statement)
-    told = statements_of(
+    statement = scope.context.alias(Statement)
+    named = statements_of(
         scope.context.alias,
         scope.entity,
-        said,
+        statement,
         scope.context.statements_of_structures(*DOCUMENTING),
         *DOCUMENTING,
     )
-    count = select(func.count(distinct(said.c.document_id))).where(told)
+    count = select(func.count(distinct(statement.c.document_id))).where(named)
     return count.correlate(scope.entity).scalar_subquery()
 
 
@@ -292,7 +292,7 @@ class _Departure:
         met = or_(*(measure == 0.0 for measure in parts))
         return case((met, literal(0.0, Double)), (complete, smallest), else_=null())
 
-    def _extreme(self, sqlite: str, other: str, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
+    def _extreme(self, sqlite: str, postgresql: str, parts: list[ColumnElement[Any]]) -> ColumnElement[Any]:
         dialect = self.scope.context.session.get_bind().dialect.name
-        extreme: ColumnElement[Any] = getattr(func, sqlite if dialect == "sqlite" else other)(*parts)
+        extreme: ColumnElement[Any] = getattr(func, sqlite if dialect == "sqlite" else postgresql)(*parts)
         return extreme

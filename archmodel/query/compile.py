@@ -122,9 +122,9 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
                     for value in values
                     for name in terms_named(scope.context, attribute.vocabulary, value)
                 ]
-                return _tested(scope, attribute, column, lambda one: one.in_(named))
+                return _tested(scope, attribute, column, lambda expression: expression.in_(named))
             constants = [_constant(scope, attribute, value) for value in values]
-            return _tested(scope, attribute, column, lambda one: one.in_(constants))
+            return _tested(scope, attribute, column, lambda expression: expression.in_(constants))
         case Comparison(name, sign, value):
             attribute, column = _column(scope, name)
             if attribute.name == "kind":
@@ -133,7 +133,7 @@ def condition_in(scope: Where, node: Node) -> ColumnElement[bool]:
                 return _ordered(scope, name, attribute, sign, value)
             if attribute.vocabulary is not None:
                 terms = terms_named(scope.context, attribute.vocabulary, value)
-                named_so = _tested(scope, attribute, column, lambda one: one.in_(terms))
+                named_so = _tested(scope, attribute, column, lambda expression: expression.in_(terms))
                 return named_so if sign == "=" else and_(column.is_not(None), not_(named_so))
             operand = _operand(scope, attribute, value)
             compared: ColumnElement[bool] = _OPERATORS[sign](column, operand)
@@ -167,13 +167,13 @@ def _amount(scope: Where, amount: Amount) -> ColumnElement[Any]:
     """Return a number computed of attributes that are numbers."""
     total: Any = literal(0.0, Double)
     for term in amount.terms:
-        part: Any = literal(term.factor, Double)
+        product: Any = literal(term.factor, Double)
         if term.attribute is not None:
-            part = part * _computable(scope, term.attribute)
+            product = product * _computable(scope, term.attribute)
         if term.divisor is not None:
             # what is divided by zero is not known
-            part = part / func.nullif(_computable(scope, term.divisor), 0)
-        total = total + part
+            product = product / func.nullif(_computable(scope, term.divisor), 0)
+        total = total + product
     return func.abs(total) if amount.absolute else total
 
 
@@ -189,13 +189,13 @@ def _computable(scope: Where, token: Token) -> ColumnElement[Any]:
 def _call(scope: Where, call: Call) -> ColumnElement[bool]:
     """Return the condition of a function."""
     name = call.function.text.lower()
-    known: Mapping[str, Function] = FUNCTIONS if isinstance(scope, Scope) else STRUCTURE_FUNCTIONS
-    if (function := known.get(name)) is None:
+    functions: Mapping[str, Function] = FUNCTIONS if isinstance(scope, Scope) else STRUCTURE_FUNCTIONS
+    if (function := functions.get(name)) is None:
         if name in _attributes(scope):
             what, remedy = f"{name} is an attribute, not a function", "compare it, e.g. depth > 0.4"
         else:
             what = f"unknown function {call.function.text[:40]!r}"
-            remedy = meant(name, known, "the functions")
+            remedy = meant(name, functions, "the functions")
         raise complaint(call.function, what, remedy)
     scope.context.count_function(call.function)
     return function.sql(scope, call, condition_in)
@@ -206,8 +206,8 @@ def _attributes(scope: Where) -> Mapping[str, Attribute]:
     if isinstance(scope, StructureScope):
         return STRUCTURE_ATTRIBUTES
     session = scope.context.session
-    known: Mapping[str, Attribute] = scope.context.once("attributes", lambda: attributes_of(session))
-    return known
+    attributes: Mapping[str, Attribute] = scope.context.once("attributes", lambda: attributes_of(session))
+    return attributes
 
 
 def _found(scope: Where, name: str) -> Attribute | None:
@@ -221,11 +221,11 @@ def _column(scope: Where, token: Token) -> tuple[Attribute, ColumnElement[Any]]:
     """Return the attribute that a token names, and its column: ``depth``, ``von_mises_max@12``."""
     name, at, number = token.text.partition("@")
     if (attribute := _found(scope, name.lower())) is None:
-        known = _attributes(scope)
+        attributes = _attributes(scope)
         functions = FUNCTIONS if isinstance(scope, Scope) else STRUCTURE_FUNCTIONS
         if name.lower() in functions:
             raise complaint(token, f"{name} is a function", f"write {functions[name.lower()].usages[0][0]}")
-        raise complaint(token, f"unknown attribute {name[:40]!r}", meant(name, known, "the attributes"))
+        raise complaint(token, f"unknown attribute {name[:40]!r}", meant(name, attributes, "the attributes"))
     if at and not attribute.of_run:
         what = f"{attribute.name} does not depend on a run"
         raise complaint(token, what, f"write {attribute.name} without @{number[:20]}")
@@ -241,14 +241,14 @@ def _operand(scope: Where, attribute: Attribute, value: Token) -> Any:
     """Return the right side of a comparison: a constant, or another attribute of the same kind (depth > length)."""
     if value.role == "word" and (attribute.is_number or (attribute.of_run and "@" in value.text)):
         name = value.text.partition("@")[0].lower()
-        other = _found(scope, name)
-        if other is None:
+        operand = _found(scope, name)
+        if operand is None:
             kind = _type_of(attribute)
             what = f"{value.text[:40]!r} is neither {kind} nor an attribute, and {attribute.name} is {kind}"
             raise complaint(value, what, meant(name, _attributes(scope), "the attributes"))
-        if (other.is_number, other.is_truth) != (attribute.is_number, attribute.is_truth):
+        if (operand.is_number, operand.is_truth) != (attribute.is_number, attribute.is_truth):
             raise complaint(
-                value, f"{attribute.name} is {_type_of(attribute)}, {other.name} is {_type_of(other)}"
+                value, f"{attribute.name} is {_type_of(attribute)}, {operand.name} is {_type_of(operand)}"
             )
         return _column(scope, value)[1]
     return _constant(scope, attribute, value)

@@ -62,7 +62,7 @@ def statements_of_structures(alias: Alias, *kinds: str) -> CTE:
     CTE
         of structure_id, statement_id, distance (0: said of the structure itself)
     """
-    statement, part = alias(Statement), alias(Structure)
+    statement, child = alias(Statement), alias(Structure)
     # > 0, and not "is not null", since SQLite has an index for it
     seeds = select(
         statement.c.structure_id.label("structure_id"),
@@ -71,9 +71,9 @@ def statements_of_structures(alias: Alias, *kinds: str) -> CTE:
     ).where(statement.c.structure_id > 0, statement.c.kind.in_(kinds), held(statement))
     reach = seeds.cte(recursive=True)
     return reach.union_all(
-        select(part.c.id, reach.c.statement_id, reach.c.distance + 1)
-        .join_from(reach, part, part.c.parent_id == reach.c.structure_id)
-        .where(held(part), reach.c.distance < MAX_LEVELS)
+        select(child.c.id, reach.c.statement_id, reach.c.distance + 1)
+        .join_from(reach, child, child.c.parent_id == reach.c.structure_id)
+        .where(held(child), reach.c.distance < MAX_LEVELS)
     )
 
 
@@ -157,9 +157,9 @@ class Opinions:
 
 
 def statements_of(
-    alias: Alias, entity: FromClause, said: FromClause, of_structures: CTE, *kinds: str
+    alias: Alias, entity: FromClause, candidate: FromClause, of_structures: CTE, *kinds: str
 ) -> ColumnElement[bool]:
-    """Return the condition that a statement `said` is one of the entity, or of a structure of which it is a member.
+    """Return the condition that a statement `candidate` is one of the entity or of a structure that it is a member of.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def statements_of(
         .where(member.c.entity_id == entity.c.id, held(member))
     )
     # one list of numbers and not two conditions joined by "or", for which PostgreSQL reads all statements
-    return said.c.id.in_(union_all(by_itself.correlate(entity), by_structure.correlate(entity)))
+    return candidate.c.id.in_(union_all(by_itself.correlate(entity), by_structure.correlate(entity)))
 
 
 def entities_with_statement(
@@ -229,14 +229,14 @@ def observations_of(
 
 
 def _of_same_type(
-    alias: Alias, entity_id: ColumnElement[int], said: FromClause, around: FromClause
+    alias: Alias, entity_id: ColumnElement[int], candidate: FromClause, around: FromClause
 ) -> ColumnElement[bool]:
-    """Test for an observation about the entity itself of the type of `said`."""
+    """Test for an observation about the entity itself of the type of `candidate`."""
     statement = alias(Statement)
     same = select(statement.c.id).where(
         statement.c.entity_id == entity_id,
         statement.c.kind == "observation",
-        statement.c.type == said.c.type,
+        statement.c.type == candidate.c.type,
         held(statement),
     )
-    return same.correlate(around, said).exists()
+    return same.correlate(around, candidate).exists()

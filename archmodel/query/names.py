@@ -34,13 +34,13 @@ MAX_SHOWN = 12
 """So many names are listed where none is like what was written."""
 
 
-def meant(written: str, known: Iterable[str], what: str) -> str:
+def meant(written: str, choices: Iterable[str], what: str) -> str:
     """Suggest names: the nearest ones, or the first of all if none is near."""
-    names = list(known)
+    names = list(choices)
     lower = {name.lower(): name for name in names}
-    near = difflib.get_close_matches(written[:40].lower(), lower, n=3, cutoff=0.5)
-    if near:
-        return f"did you mean {' or '.join(lower[name] for name in near)}?"
+    similar = difflib.get_close_matches(written[:40].lower(), lower, n=3, cutoff=0.5)
+    if similar:
+        return f"did you mean {' or '.join(lower[name] for name in similar)}?"
     shown = [*names[:MAX_SHOWN], "…"] if len(names) > MAX_SHOWN else names
     return f"{what} are {', '.join(shown)}" if shown else f"there are no {what.removeprefix('the ')} yet"
 
@@ -69,8 +69,8 @@ def structure_named(context: Context, code: Token) -> int:
         structure = select(Structure.id).where(Structure.code == code.text, Structure.superseded_id.is_(None))
         number = context.session.scalar(structure)
         if number is None:
-            known = select(Structure.code).where(Structure.superseded_id.is_(None)).order_by(Structure.code)
-            remedy = meant(code.text, context.session.scalars(known), "the structures")
+            codes = select(Structure.code).where(Structure.superseded_id.is_(None)).order_by(Structure.code)
+            remedy = meant(code.text, context.session.scalars(codes), "the structures")
             raise complaint(code, f"there is no structure {code.text[:40]!r} in the database", remedy)
         return number
 
@@ -79,8 +79,8 @@ def structure_named(context: Context, code: Token) -> int:
 
 def marks_named(context: Context, sign: Token) -> list[str]:
     """Return the signs of a mason mark and of narrower terms; an error if none of them is held."""
-    known = select(MasonMark.sign).where(MasonMark.superseded_id.is_(None), MasonMark.sign.is_not(None))
-    signs = context.once("marks", lambda: sorted(set(context.session.scalars(known))))
+    held_signs = select(MasonMark.sign).where(MasonMark.superseded_id.is_(None), MasonMark.sign.is_not(None))
+    signs = context.once("marks", lambda: sorted(set(context.session.scalars(held_signs))))
     named = terms_named(context, "mark", sign)
     if not set(named) & set(signs):
         what = f"there is no mason mark {sign.text[:40]!r} in the database"
@@ -90,8 +90,8 @@ def marks_named(context: Context, sign: Token) -> list[str]:
 
 def author_named(context: Context, author: Token) -> str:
     """Return the name of an author of statements that are held; an error if there is none."""
-    known = select(Statement.author).where(Statement.superseded_id.is_(None)).distinct()
-    names = context.once("authors", lambda: sorted(filter(None, context.session.scalars(known))))
+    held_authors = select(Statement.author).where(Statement.superseded_id.is_(None)).distinct()
+    names = context.once("authors", lambda: sorted(filter(None, context.session.scalars(held_authors))))
     if author.text not in names:
         what = f"nothing that is held was stated by {author.text[:40]!r}"
         raise complaint(author, what, meant(author.text, names, "the authors"))
@@ -106,17 +106,17 @@ def terms_named(context: Context, name: str, word: Token) -> list[str]:
     QueryError
         in a closed vocabulary, if there is no such term
     """
-    known = context.once(("vocabulary", name), lambda: vocabulary(context.session, name))
+    terms = context.once(("vocabulary", name), lambda: vocabulary(context.session, name))
     try:
-        return list(known.below(known.named(word.text)))
+        return list(terms.below(terms.named(word.text)))
     except UsageError as error:
         raise complaint(word, error.what, error.remedy) from None
 
 
 def campaign_named(context: Context, campaign: Token) -> str:
     """Return the name of a survey that was taken in; an error if there is none."""
-    known = select(Survey.name).distinct().order_by(Survey.name)
-    names = context.once("campaigns", lambda: list(context.session.scalars(known)))
+    surveys = select(Survey.name).distinct().order_by(Survey.name)
+    names = context.once("campaigns", lambda: list(context.session.scalars(surveys)))
     if campaign.text not in names:
         what = f"there is no survey {campaign.text[:40]!r} in the database"
         raise complaint(campaign, what, meant(campaign.text, names, "the surveys"))
@@ -125,9 +125,9 @@ def campaign_named(context: Context, campaign: Token) -> str:
 
 def phase_begins(context: Context, phase: Token) -> int:
     """Return the first year of a phase; an error if there is no such phase, or its years are not known."""
-    known = select(Phase.name, Phase.begins, Phase.ends).where(Phase.superseded_id.is_(None))
+    dated = select(Phase.name, Phase.begins, Phase.ends).where(Phase.superseded_id.is_(None))
     phases: dict[str, tuple[int | None, int | None]] = context.once(
-        "phases", lambda: {row.name: (row.begins, row.ends) for row in context.session.execute(known)}
+        "phases", lambda: {row.name: (row.begins, row.ends) for row in context.session.execute(dated)}
     )
     if phase.text not in phases:
         what = f"there is no phase {phase.text[:40]!r} in the database"
@@ -142,9 +142,11 @@ def phase_begins(context: Context, phase: Token) -> int:
 
 def document_named(context: Context, code: Token) -> int:
     """Return the number of a document that is held now."""
-    known = select(Document.code, Document.id).where(Document.superseded_id.is_(None)).order_by(Document.code)
+    current = (
+        select(Document.code, Document.id).where(Document.superseded_id.is_(None)).order_by(Document.code)
+    )
     documents: dict[str, int] = context.once(
-        "documents", lambda: {row.code: row.id for row in context.session.execute(known)}
+        "documents", lambda: {row.code: row.id for row in context.session.execute(current)}
     )
     if code.text not in documents:
         what = f"there is no document {code.text[:40]!r} in the database"
@@ -162,14 +164,14 @@ def run_with_number(context: Context, token: Token, number: str) -> int:
     """
     runs, number = _runs(context), number.removeprefix("study")
     # No int() of what is no number, and no number that is longer than any run's.
-    found = int(number) if number.isascii() and number.isdigit() and len(number) < 11 else -1
-    if found not in runs:
+    run = int(number) if number.isascii() and number.isdigit() and len(number) < 11 else -1
+    if run not in runs:
         raise complaint(token, f"there is no run {number[:40]!r} in the database", _known_runs(runs))
     used: set[int] = context.once("runs used", set)
-    used.add(found)
+    used.add(run)
     if len(used) > MAX_RUNS:
         raise complaint(token, f"more than {MAX_RUNS} runs", "ask in several queries")
-    return found
+    return run
 
 
 def refuse_unknown_run(context: Context) -> None:

@@ -30,8 +30,8 @@ def _own(name: str) -> Source:
 def _parent(scope: StructureScope, run: int | None) -> ColumnElement[str]:
     """Return the code of the structure that it is a part of."""
     whole = scope.context.alias(Structure)
-    found = select(whole.c.code).where(whole.c.id == scope.structure.c.parent_id)
-    return found.correlate(scope.structure).scalar_subquery()
+    parent = select(whole.c.code).where(whole.c.id == scope.structure.c.parent_id)
+    return parent.correlate(scope.structure).scalar_subquery()
 
 
 def _members(scope: StructureScope, run: int | None) -> ColumnElement[int]:
@@ -50,13 +50,13 @@ def _bond(scope: StructureScope, run: int | None) -> ColumnElement[str]:
     bond = case(
         (and_(headers > 0, stretchers > 0), "mixed"), (headers > 0, "header"), (stretchers > 0, "stretcher")
     )
-    found = (
+    agreed = (
         select(bond)
         .select_from(rows)
         .join(stones, stones.c.id == rows.c.entity_id)
         .where(rows.c.structure_id == scope.structure.c.id, held(rows))
     )
-    return found.correlate(scope.structure).scalar_subquery()
+    return agreed.correlate(scope.structure).scalar_subquery()
 
 
 def _parts(scope: StructureScope, run: int | None) -> ColumnElement[int]:
@@ -95,21 +95,21 @@ def _opinion(about: str, column: str, named: type[Phase] | type[Material]) -> So
         """Return the statement of the author who is followed."""
         context = scope.context
         rule = context.once(("rule", about), lambda: rule_of(context.session, about))
-        reach, said, row = (
+        reach, statement, row = (
             context.statements_of_structures(about),
             context.alias(Statement),
             context.alias(named),
         )
-        found = (
+        name = (
             select(row.c.name)
             .select_from(reach)
-            .join(said, said.c.id == reach.c.statement_id)
-            .join(row, row.c.id == said.c[column])
+            .join(statement, statement.c.id == reach.c.statement_id)
+            .join(row, row.c.id == statement.c[column])
             .where(reach.c.structure_id == scope.structure.c.id)
-            .order_by(reach.c.distance, *preference(rule, said, context.alias(Statement)))
+            .order_by(reach.c.distance, *preference(rule, statement, context.alias(Statement)))
             .limit(1)
         )
-        return found.correlate(scope.structure).scalar_subquery()
+        return name.correlate(scope.structure).scalar_subquery()
 
     return value
 
@@ -142,8 +142,8 @@ def _attribute(
 
 
 STRUCTURE_ATTRIBUTES: Mapping[str, Attribute] = {
-    one.name: one
-    for one in (
+    attribute.name: attribute
+    for attribute in (
         _attribute("code", None, "its name", _own("code")),
         _attribute("kind", None, "its own kind, e.g. arch", _own("kind")),
         _attribute("title", None, "its name in words", _own("title")),

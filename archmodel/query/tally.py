@@ -142,15 +142,15 @@ def _only_in(
         return {row["code"] for row in find_rows(session, kind, [*where, *more], run, ["code"])}
 
     true, false = codes(expression), codes(f"not ({expression})")
-    kept: dict[tuple[object, ...], list[Row]] = {}
+    chosen: dict[tuple[object, ...], list[Row]] = {}
     for values, members in groups.items():
         inside = {row["code"] for row in members}
         if inside <= true:
-            kept[values] = members
+            chosen[values] = members
         elif inside & true and not inside & false:
             named = ", ".join("none" if value is None else str(value) for value in values)
             notes.append(f"{named}: not known of {len(inside - true)}")
-    return kept
+    return chosen
 
 
 def _total(rows: Sequence[Row], name: str) -> float:

@@ -20,7 +20,7 @@ MOST = {
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 
-MOST_OF_10_000 = {"all": 148, "one": 29}
+MOST_OF_10_000 = {"all": 112, "one": 22}
 """Empty words among identifiers: all that are listed, and the most frequent."""
 
 REMEDY = {

@@ -50,13 +50,13 @@ OPINIONS: Mapping[str, str] = {
 
 def has_mark(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Test for mason marks. A mark of a structure is somewhere on it, on no stone in particular."""
-    said = scope.context.alias(Statement)
+    mark = scope.context.alias(Statement)
     conditions: list[Condition] = [
-        held(said),
-        said.c.entity_id == scope.entity.c.id,
-        said.c.kind == "mason_mark",
+        held(mark),
+        mark.c.entity_id == scope.entity.c.id,
+        mark.c.kind == "mason_mark",
     ]
-    conditions += [said.c.sign.in_(marks_named(scope.context, sign)) for sign in tokens(call, 0, 1)]
+    conditions += [mark.c.sign.in_(marks_named(scope.context, sign)) for sign in tokens(call, 0, 1)]
     return _any_row(scope, *conditions)
 
 
@@ -66,17 +66,17 @@ def observed(scope: Scope, call: Call, ask: Ask) -> Condition:
     types = terms_named(scope.context, "observation", values[0]) if values else []
     least = _severity(values[1]) if len(values) == 2 else None
 
-    def conditions(said: FromClause) -> list[Condition]:
+    def conditions(statement: FromClause) -> list[Condition]:
         """Return the conditions on type and severity."""
-        of_type: list[Condition] = [said.c.type.in_(types)] if types else []
-        return of_type if least is None else [*of_type, said.c.severity >= least]
+        of_type: list[Condition] = [statement.c.type.in_(types)] if types else []
+        return of_type if least is None else [*of_type, statement.c.severity >= least]
 
     context = scope.context
     of_structures = context.statements_of_structures("observation")
-    told = entities_with_statement(
+    with_observation = entities_with_statement(
         context.alias, of_structures, conditions, "observation", own_type_first=True
     )
-    return scope.entity.c.id.in_(told)
+    return scope.entity.c.id.in_(with_observation)
 
 
 def _severity(token: Token) -> int:
@@ -90,9 +90,9 @@ def documented(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Test for documents that any statement about the stone, or its structures, names."""
     numbers = [document_named(scope.context, code) for code in tokens(call, 0, 1)]
 
-    def conditions(said: FromClause) -> list[Condition]:
+    def conditions(statement: FromClause) -> list[Condition]:
         """Return the conditions on the document."""
-        return [said.c.document_id > 0, *(said.c.document_id == number for number in numbers)]
+        return [statement.c.document_id > 0, *(statement.c.document_id == number for number in numbers)]
 
     context = scope.context
     of_structures = context.statements_of_structures(*DOCUMENTING)
@@ -109,9 +109,9 @@ def by(scope: Scope, call: Call, ask: Ask) -> Condition:
         kinds = (_opinion(values[1], OPINIONS),)
     author = author_named(scope.context, values[0])
 
-    def conditions(said: FromClause) -> list[Condition]:
+    def conditions(statement: FromClause) -> list[Condition]:
         """Return the condition on the author."""
-        return [said.c.author == author]
+        return [statement.c.author == author]
 
     context = scope.context
     of_structures = context.statements_of_structures(*kinds)
@@ -142,10 +142,10 @@ def corrected(scope: Scope, call: Call, ask: Ask) -> Condition:
         entries.c.action.in_(("correction", "declaration")),
     ]
     for token in tokens(call, 0, 1):
-        known = attributes_of(scope.context.session)
-        if (name := token.text.lower()) not in known:
+        attributes = attributes_of(scope.context.session)
+        if (name := token.text.lower()) not in attributes:
             raise complaint(
-                token, f"unknown attribute {token.text[:40]!r}", meant(name, known, "the attributes")
+                token, f"unknown attribute {token.text[:40]!r}", meant(name, attributes, "the attributes")
             )
         conditions.append(rows.c.attribute == name)
     return _any_row(scope, *conditions)
@@ -183,10 +183,10 @@ def canonical(scope: Scope | StructureScope, call: Call, ask: Ask) -> Condition:
     root = Entity if isinstance(scope, Scope) else Structure
     if context.within_canon:
         raise complaint(call.function, "canonical proportions cannot refer to canonical()")
-    known = kinds_in(context.session, root)
+    classes = kinds_in(context.session, root)
     with_canon: dict[Proportions, list[str]] = {}
     for name, canon in context.once("canons", lambda: canons(context.session)).items():
-        if name in known:
+        if name in classes:
             with_canon.setdefault(canon, []).append(name)
     cases = []
     for canon, names in with_canon.items():

@@ -4,12 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from archmodel.query.functions import knowledge as told
+from archmodel.query.functions import knowledge, texts
 from archmodel.query.functions import relations as related
 from archmodel.query.functions import spatial as places
 from archmodel.query.functions import stratigraphy as layered
 from archmodel.query.functions import structures as whole
-from archmodel.query.functions import texts
 from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES, Ask, Condition
 from archmodel.query.grammar import Call
 
@@ -48,23 +47,23 @@ _SQL: Mapping[str, Sql] = {
     "before": layered.in_time(later=False),
     "contradicted": layered.contradicted,
     "member_of": related.member_of,
-    "has_mark": told.has_mark,
-    "observed": told.observed,
-    "documented": told.documented,
-    "by": told.by,
-    "disputed": told.disputed,
+    "has_mark": knowledge.has_mark,
+    "observed": knowledge.observed,
+    "documented": knowledge.documented,
+    "by": knowledge.by,
+    "disputed": knowledge.disputed,
     "text": texts.text,
-    "corrected": told.corrected,
-    "in_mechanism": told.in_mechanism,
-    "is_a": told.is_a,
-    "canonical": told.canonical,
+    "corrected": knowledge.corrected,
+    "in_mechanism": knowledge.in_mechanism,
+    "is_a": knowledge.is_a,
+    "canonical": knowledge.canonical,
     "moved_since": places.moved_since,
 }
 
 _SQL_OF_STRUCTURES: Mapping[str, Sql] = {
     "part_of": related.part_of,
     "has": whole.has,
-    "is_a": told.is_a,
+    "is_a": knowledge.is_a,
     "above": layered.on_one_another(upwards=True),
     "below": layered.on_one_another(upwards=False),
     "after": layered.in_time(later=True),
@@ -72,7 +71,7 @@ _SQL_OF_STRUCTURES: Mapping[str, Sql] = {
     "contradicted": layered.contradicted,
     "disputed": whole.disputed_structure,
     "changes": whole.changes,
-    "canonical": told.canonical,
+    "canonical": knowledge.canonical,
 }
 
 FUNCTIONS: Mapping[str, Function] = {

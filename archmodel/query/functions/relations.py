@@ -33,8 +33,8 @@ def related(name: str, subject: str, other: str) -> Callable[[Scope, Call, Ask],
             parts.append(chosen if wanted is None else chosen.where(wanted(rows.c[theirs])))
         if wanted is not None:
             return scope.entity.c.id.in_(union_all(*parts) if len(parts) > 1 else parts[0])
-        mine_first = (part.where(part.selected_columns[0] == scope.entity.c.id) for part in parts)
-        return or_(*(part.correlate(scope.entity).exists() for part in mine_first))
+        mine_first = (selected.where(selected.selected_columns[0] == scope.entity.c.id) for selected in parts)
+        return or_(*(selected.correlate(scope.entity).exists() for selected in mine_first))
 
     return sql
 
@@ -108,10 +108,10 @@ def _named_with_parts(context: Context, argument: Token | Node, ask: Ask) -> Fro
 
 def with_parts(context: Context, wanted: Callable[[FromClause], Condition]) -> FromClause:
     """Return the numbers of the structures that satisfy a condition, and of their parts."""
-    whole, part = context.alias(Structure), context.alias(Structure)
+    whole, child = context.alias(Structure), context.alias(Structure)
     parts = select(whole.c.id).where(held(whole), wanted(whole)).cte(recursive=True)
     return parts.union(
-        select(part.c.id).join_from(parts, part, part.c.parent_id == parts.c.id).where(held(part))
+        select(child.c.id).join_from(parts, child, child.c.parent_id == parts.c.id).where(held(child))
     )
 
 

@@ -67,7 +67,7 @@ def moved_since(scope: Scope, call: Call, ask: Ask) -> Condition:
 
     surveys = campaigns(context.session)
     if not context.once(("again", name), lambda: measured_again(context.session, surveys[name])):
-        others = ", ".join(other for other in surveys if other != name) or "there is none"
+        others = ", ".join(survey for survey in surveys if survey != name) or "there is none"
         what = f"no stone was measured again since the survey {name[:40]!r}"
         raise complaint(token, what, f"name the earlier survey of two: {others[:200]}")
     rows = scope.displacement()

@@ -20,7 +20,7 @@ __all__ = ["changes", "disputed_structure", "has"]
 def has(scope: StructureScope, call: Call, ask: Ask) -> Condition:
     """Test for a stone among the members of a structure, or of its parts."""
     context, argument = scope.context, only(call)
-    rows, part = context.alias(Membership), context.alias(Structure)
+    rows, child = context.alias(Membership), context.alias(Structure)
     members = select(rows.c.structure_id).where(held(rows))
     if isinstance(argument, Token):
         members = members.where(rows.c.entity_id == stone_named(context, argument).id)
@@ -32,9 +32,9 @@ def has(scope: StructureScope, call: Call, ask: Ask) -> Condition:
     # from the structures of such members upwards, to all that contain them
     reach = members.cte(recursive=True)
     reach = reach.union(
-        select(part.c.parent_id)
-        .join_from(reach, part, part.c.id == reach.c.structure_id)
-        .where(held(part), part.c.parent_id.is_not(None))
+        select(child.c.parent_id)
+        .join_from(reach, child, child.c.id == reach.c.structure_id)
+        .where(held(child), child.c.parent_id.is_not(None))
     )
     return scope.structure.c.id.in_(select(reach.c.structure_id))
 
@@ -71,12 +71,12 @@ def disputed_structure(scope: StructureScope, call: Call, ask: Ask) -> Condition
 
 def _differ(scope: StructureScope, about: str) -> ColumnElement[bool]:
     context, here = scope.context, scope.structure
-    reach, said = context.statements_of_structures(about), context.alias(Statement)
+    reach, statement = context.statements_of_structures(about), context.alias(Statement)
     nearest = select(func.min(reach.c.distance)).where(reach.c.structure_id == here.c.id).correlate(here)
     count = (
-        select(func.count(distinct(said.c[DISPUTABLE[about]])))
+        select(func.count(distinct(statement.c[DISPUTABLE[about]])))
         .select_from(reach)
-        .join(said, said.c.id == reach.c.statement_id)
+        .join(statement, statement.c.id == reach.c.statement_id)
         .where(reach.c.structure_id == here.c.id, reach.c.distance == nearest.scalar_subquery())
     )
     return count.correlate(here).scalar_subquery() > 1

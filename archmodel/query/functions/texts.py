@@ -66,9 +66,9 @@ def text(scope: Scope, call: Call, ask: Ask) -> Condition:
 def _in_titled(scope: Scope, has: Has) -> Select[Any]:
     """Select the members of structures whose title or code has the words, and those of their parts."""
     context = scope.context
-    whole, part, member = context.alias(Structure), context.alias(Structure), context.alias(Membership)
+    whole, child, member = context.alias(Structure), context.alias(Structure), context.alias(Membership)
     parts = select(whole.c.id).where(held(whole), has(whole.c.title, whole.c.code)).cte(recursive=True)
     parts = parts.union(
-        select(part.c.id).join_from(parts, part, part.c.parent_id == parts.c.id).where(held(part))
+        select(child.c.id).join_from(parts, child, child.c.parent_id == parts.c.id).where(held(child))
     )
     return select(member.c.entity_id).where(held(member), member.c.structure_id.in_(select(parts.c.id)))
