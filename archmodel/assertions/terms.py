@@ -53,7 +53,8 @@ def declare_term(
         term would be broader than itself
     """
     checked_choice("vocabulary", of, VOCABULARIES)
-    alone, words = words is None, words or vocabulary(session, of)
+    alone = words is None
+    words = words or vocabulary(session, of)
     name = checked_label("term", name)
     current = _held(session, of, name) if name in words.labels else None
     meaning = checked_text("definition", definition) or (None if current is None else current.definition)

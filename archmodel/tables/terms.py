@@ -176,11 +176,12 @@ def term_for(session: Session, name: str, text: str) -> str:
 def vocabulary(session: Session, name: str) -> Vocabulary:
     """Return a vocabulary as it is held now; it is loaded once in a transaction, until its terms change."""
     session.flush()
-    transaction, stamp, words = session.info.get((Term, name), (None, None, None))
-    if transaction is None or (transaction, stamp) != (session.get_transaction(), _stamp(session, name)):
-        words = _loaded(session, name)
-        keep(session, words)
-    return words  # type: ignore[no-any-return]
+    cached: tuple[object, object, Vocabulary] | None = session.info.get((Term, name))
+    if cached is not None and cached[:2] == (session.get_transaction(), _stamp(session, name)):
+        return cached[2]
+    words = _loaded(session, name)
+    keep(session, words)
+    return words
 
 
 def keep(session: Session, words: Vocabulary) -> None:

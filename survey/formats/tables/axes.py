@@ -62,7 +62,7 @@ def exchanged(places: Array, elsewhere: Array) -> bool:
 
 
 def _turned(place: Array) -> Array:
-    return np.asarray(place)[[1, 0, 2]]
+    return np.array([place[1], place[0], place[2]])
 
 
 def _distance(place: Array, elsewhere: Array) -> float:
