@@ -74,7 +74,7 @@ def load_drawn(session: Session) -> Mapping[str, DrawnUnit]:
     named = {row.code: row.title for row in session.execute(titles)}
     noted: dict[str, dict[str, str]] = {}
     for code, key, text in session.execute(notes):
-        if key != KIND_NOTE or text in UNIT_KINDS:
+        if key and text and (key != KIND_NOTE or text in UNIT_KINDS):
             noted.setdefault(str(code), {})[key] = text
     return {
         code: DrawnUnit(

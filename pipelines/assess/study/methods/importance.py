@@ -40,7 +40,8 @@ class Weighted:
         known = values[np.isfinite(values)]
         if not len(known):
             return ()
-        return tuple(np.linspace(*np.quantile(known, [1.0 / count, 1.0 - 1.0 / count]), count).tolist())
+        low, high = np.quantile(known, [1.0 / count, 1.0 - 1.0 / count]).tolist()
+        return tuple(np.linspace(low, high, count).tolist())
 
 
 def importance(
