@@ -111,7 +111,7 @@ def _of_entity(session: Session, number: int) -> Iterator[Event]:
     told = first_values(session, number, "code", "kind", "course", "zone", "depth")
     yield _event(entity.entry, "recorded", "entity", told)
     measured = select(Measurement).where(Measurement.entity_id == number).order_by(Measurement.id)
-    yield from _chain(session.scalars(measured).all(), "measurement", _measurement, lambda one: one.entity_id)
+    yield from _chain(session.scalars(measured).all(), "measurement", _measurement, lambda row: row.entity_id)
     corrections = select(Correction).where(Correction.entity_id == number).order_by(Correction.id)
     for row in session.scalars(corrections):
         yield _event(row.entry, "corrected", row.attribute, {"value": row.after}, {"value": row.before})
@@ -122,7 +122,7 @@ def _of_entity(session: Session, number: int) -> Iterator[Event]:
         .order_by(Membership.id)
     )
     yield from _chain(
-        session.scalars(member).all(), "membership", _structure_of, lambda one: one.structure_id
+        session.scalars(member).all(), "membership", _structure_of, lambda row: row.structure_id
     )
     yield from _relations(session, number)
     yield from _canons(session, type(entity))
@@ -149,11 +149,18 @@ def _relations(session: Session, number: int) -> Iterator[Event]:
     for kind in dict.fromkeys(INVERSE.values()):
         seen = [row for row in rows if (row.kind if row.subject_id == number else INVERSE[row.kind]) == kind]
 
-        def told(one: Relation) -> Values:
-            other = one.object if one.subject_id == number else one.subject
-            return {"code": other.code, "declared": one.declared, "area": one.area, "gap": one.gap}
+        def told(relation: Relation) -> Values:
+            other = relation.object if relation.subject_id == number else relation.subject
+            return {
+                "code": other.code,
+                "declared": relation.declared,
+                "area": relation.area,
+                "gap": relation.gap,
+            }
 
-        yield from _chain(seen, kind, told, lambda one: (one.subject_id, one.object_id, one.declared))
+        yield from _chain(
+            seen, kind, told, lambda relation: (relation.subject_id, relation.object_id, relation.declared)
+        )
 
 
 def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
@@ -175,8 +182,8 @@ def _of_structure(session: Session, held: Structure) -> Iterator[Event]:
     yield from _chain(
         session.scalars(members).all(),
         "member",
-        lambda one: {"code": one.entity.code, "rank": one.rank},
-        lambda one: one.entity_id,
+        lambda row: {"code": row.entity.code, "rank": row.rank},
+        lambda row: row.entity_id,
     )
     yield from _canons(session, type(held))
     yield from _statements(session, "structure_id", held.id)
@@ -228,8 +235,8 @@ def _statements(session: Session, column: str, number: int) -> Iterator[Event]:
         .options(joinedload(Statement.document))
         .order_by(Statement.id)
     ).all()
-    by_number = {one.id: one for one in rows}
-    replaced = {one.supersedes_id for one in rows}
+    by_number = {row.id: row for row in rows}
+    replaced = {row.supersedes_id for row in rows}
     for row in rows:
         old = by_number.get(row.supersedes_id) if row.supersedes_id is not None else None
         before = None if old is None else statement_values(old)
@@ -248,7 +255,7 @@ def _chain(
 ) -> Iterator[Event]:
     """Chain rows without ``supersedes_id``: one that began with the entry that ended another replaces it."""
     ended: dict[tuple[Hashable, int], Recorded] = {
-        (about(one), one.superseded_id): one for one in rows if one.superseded_id is not None
+        (about(row), row.superseded_id): row for row in rows if row.superseded_id is not None
     }
     for row in rows:
         old = ended.pop((about(row), row.entry_id), None)

@@ -234,13 +234,13 @@ def _departing(estimates: Estimates) -> list[str]:
         return []
     told = []
     for name, values in estimates.values.items():
-        known = values[np.isfinite(values)]
-        if len(known) < 100 or estimates.indices is not None:
+        finite = values[np.isfinite(values)]
+        if len(finite) < 100 or estimates.indices is not None:
             continue
-        low, high = np.quantile(known, [0.025, 0.975])
-        half, normal = 0.5 * float(high - low), 1.96 * float(known.std(ddof=1))
+        low, high = np.quantile(finite, [0.025, 0.975])
+        half, normal = 0.5 * float(high - low), 1.96 * float(finite.std(ddof=1))
         # standard error of half of the interval of a normal sample: 0.26 sigma/sqrt(n/10) at both ends
-        error = 1.96 * float(known.std(ddof=1)) * np.sqrt(0.5 / len(known))
+        error = 1.96 * float(finite.std(ddof=1)) * np.sqrt(0.5 / len(finite))
         if normal > 0.0 and abs(half - normal) > max(2.0 * error, 0.005 * normal):
             told.append(
                 f"{name} is not normal: 95 % of its samples lie within ± {half:.4g}, and a normal one's within "
