@@ -117,7 +117,8 @@ USAGES: Mapping[str, Usages] = {
     "moved_since": (
         (
             "moved_since(CAMPAIGN)",
-            "its place differs from that in the survey of this name by more than both can err, at 1 %; null if it was "
+            "its place differs from that in the survey of this name by more than both can err, at 1 %, what all places "
+            "along the faces scatter beyond their sigma being allowed for; null if it was "
             "not measured in both; `moved` and `moved_sigma` are then since that survey",
         ),
     ),
