@@ -60,7 +60,7 @@ MODELS: Mapping[str, Model] = {
     "cra-bridge": Model(snap=1e-5),
     "cra-shelf": Model(snap=1e-5),
     "acary-arches": Model(above=1.04),
-    "dome": Model(snap=0.003),
+    "dome": Model(snap=0.003, above=1.04),
     "crossvault": Model(snap=0.003),
     "buttresses": Model(0.6),
     "pavillion": Model(0.7),
