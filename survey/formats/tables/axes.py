@@ -26,6 +26,7 @@ __all__ = [
     "exchanged",
     "exchanged_station",
     "order_in_words",
+    "other_order",
     "outlines_of",
 ]
 
@@ -37,9 +38,7 @@ _REACH = 1000.0  # beyond which nobody measures a stone with a total station [m]
 _SAME = 0.1  # distance within which two lists place a station at one point: it is set up anew there [m]
 _PAIRS = 6  # least pairs of neighbouring stones, and least corners' turns, for a habit: by chance 1 in 64
 _HABIT = 0.9  # share of stones from which a habit is one: the others are slips
-_LEVEL = (
-    0.5  # sine of the angle of a face to the horizontal below which left and right are not those of a wall
-)
+_LEVEL = 0.5  # horizontal share of a face's area below which it lies: left and right are not a wall's [-]
 _NUMBER = re.compile(r"(.*?)(\d+)([^\d]*)")
 
 
@@ -67,6 +66,11 @@ def _turned(place: Array) -> Array:
 
 def _distance(place: Array, elsewhere: Array) -> float:
     return float(np.linalg.norm(np.asarray(place) - np.asarray(elsewhere)))
+
+
+def other_order(form: str) -> str:
+    """Return the other of the two formats of `ORDERS`."""
+    return next(order for order in ORDERS if order != form)
 
 
 def order_in_words(text: str) -> str:
@@ -154,7 +158,7 @@ def both_orders(form: str, names: Sequence[str], codes: str | None) -> str:
     if not form:
         x, y = names
         return f'give --columns "x={y},y={x}" if {x} is the northing, or --columns "x={x},y={y}" if it is the easting'
-    other = "penzd" if form == "pnezd" else "pnezd"
+    other = other_order(form)
     easting, northing = (3, 2) if form == "pnezd" else (2, 3)
     theirs, ours = (ORDERS[order].removesuffix(" first") for order in (other, form))
     return (

@@ -25,7 +25,14 @@ from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
-from survey.formats.tables.axes import ORDERS, AxisEvidence, both_orders, exchanged_station, outlines_of
+from survey.formats.tables.axes import (
+    ORDERS,
+    AxisEvidence,
+    both_orders,
+    exchanged_station,
+    other_order,
+    outlines_of,
+)
 from survey.formats.tables.code_template import (
     CONTROL_WORDS,
     ROLES,
@@ -332,7 +339,7 @@ def _check_axes(rows: AnyRows, header: tuple[int, Any], form: str) -> None:
     except SurveyError:
         return
     kinds = [kind_of_column(name) if plain(name) not in ("x", "y") else None for name in names[1:3]]
-    alternative = "penzd" if form == "pnezd" else "pnezd"
+    alternative = other_order(form)
     if kinds == list(_LIST[alternative][1:3]):
         raise rows.fail(
             number,
@@ -375,10 +382,9 @@ def _order_remarks(
         )
     if not form or evidence.speaks_for():
         return ()
-    other = "penzd" if form == "pnezd" else "pnezd"
     return (
         f"read with {ORDERS[form]}, as --format {form} says: nothing in the list confirms it, and with the other "
-        f"order (--format {other}) the wall would be the mirror image",
+        f"order (--format {other_order(form)}) the wall would be the mirror image",
     )
 
 

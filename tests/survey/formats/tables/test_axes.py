@@ -7,6 +7,7 @@ import pytest
 
 from ground.errors import SurveyError
 from survey.formats.options import ReadingOptions
+from survey.formats.tables.axes import Outlines, exchanged, exchanged_station
 from survey.formats.tables.reader import open_csv, open_penzd, open_pnezd
 from survey.orientation.formats.control import read_control
 from survey.records.survey import Station, SurveyHead
@@ -130,3 +131,30 @@ def test_control_points_of_a_national_grid_whose_northing_comes_first(tmp_path: 
             read_control(written(tmp_path, titles + turned))
     named = read_control(written(tmp_path, ["number, northing, easting, height", *turned]))
     assert named[0].place.tolist() == list(places[0])
+
+
+@pytest.mark.parametrize(("off", "same"), [(0.05, True), (0.2, False)])
+def test_a_station_that_lies_apart_is_another(off: float, same: bool) -> None:
+    there = np.array([400.0, 100.0, 1.5])
+    assert exchanged_station(np.array([100.0, 400.0 + off, 1.5]), there) is same
+
+
+@pytest.mark.parametrize(("away", "beside"), [(500.0, True), (2000.0, False)])
+def test_stones_beyond_reach_tell_nothing(away: float, beside: bool) -> None:
+    there = np.array([[400_000.0, 100_000.0, 2.0]])
+    assert exchanged(np.array([[100_000.0, 400_000.0 + away, 2.0]]), there) is beside
+
+
+@pytest.mark.parametrize(("pairs", "wrong", "habit"), [(3, 0, 0), (6, 0, 1), (20, 1, 1), (20, 4, 0)])
+def test_a_habit_needs_six_pairs_and_nine_stones_of_ten(pairs: int, wrong: int, habit: int) -> None:
+    seen = [-1.0] * wrong + [1.0] * (pairs - wrong)
+    assert Outlines(list(seen), list(seen)).habit() == habit
+
+
+@pytest.mark.parametrize(("rise", "counts"), [(4.0, 1), (1.0, 1), (0.3, 0)])
+def test_a_face_that_lies_has_no_left_and_right(rise: float, counts: int) -> None:
+    """Faces that rise by so much in a metre: the horizontal share of their area is .97, .71 and .29."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, rise], [0.0, 1.0, rise]])
+    outlines = Outlines()
+    outlines.add("W1-1", corners, np.array([0.5, -5.0, 1.0]))
+    assert len(outlines.turns) == counts
