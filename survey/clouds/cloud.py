@@ -99,7 +99,7 @@ def open_cloud(
         *wrong_outlines(drawing),
         *_stones(placed, sigmas, collected, head, options, files[0].name, review),
     ]
-    return SurveyStream(head, iter(stones), review=tuple(review))
+    return SurveyStream(head, iter(stones), review=tuple(review), remarks=drawing.remarks)
 
 
 def wrong_outlines(drawing: Drawing) -> list[Reject]:

@@ -90,7 +90,7 @@ def open_masks(path: Path, options: MaskOptions) -> SurveyStream:
     frame = None if options.size is None else np.array([(0.0, 0.0), options.size])
     review += _beyond(outlines, frame)
     stones = [*wrong_outlines(drawing), *_stones(outlines, wall, pixel, how, frame, options)]
-    return SurveyStream(head, iter(stones), review=tuple(review))
+    return SurveyStream(head, iter(stones), review=tuple(review), remarks=drawing.remarks)
 
 
 def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
@@ -123,7 +123,8 @@ def _spatial(drawing: Drawing, options: MaskOptions) -> SurveyStream:
         *wrong_outlines(drawing),
         *_stones(outlines, None, options.outline_sigma, how, None, options),
     ]
-    return SurveyStream(head, iter(stones), review=tuple(drawn_doubts(placed, drawing)))
+    review = tuple(drawn_doubts(placed, drawing))
+    return SurveyStream(head, iter(stones), review=review, remarks=drawing.remarks)
 
 
 def _with_depth(options: MaskOptions, path: Path) -> SurveyHead:

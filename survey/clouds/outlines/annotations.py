@@ -14,6 +14,7 @@ import numpy as np
 
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
+from survey.clouds.outlines.classes import class_of_stones
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
 from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.world import PixelPlace, world_of
@@ -139,15 +140,8 @@ def _of_class(
 ) -> list[tuple[_Shape, Attributes]]:
     """Return the shapes of the class of stones."""
     names = {str(key): count for key, count in counts.items()}
-    listed = ", ".join(f"{name} ({count})" for name, count in names.items())
-    if label is not None and label not in names:
-        raise UsageError(f"no label {label!r}", where=str(path), remedy=f"labels are: {listed}")
-    if label is not None:
-        return [outline for outline in outlines if str(outline[1].code) == label]
-    if len(names) > 1 and not all(kind_of(name, {}) in KINDS for name in names):
-        remedy = f"name that of the stones, e.g. --layer {max(names, key=names.__getitem__)}"
-        raise UsageError(f"{len(names)} labels: {listed}", where=str(path), remedy=remedy)
-    return outlines
+    stones = class_of_stones(path, names, label, "labels")
+    return outlines if stones is None else [outline for outline in outlines if str(outline[1].code) == stones]
 
 
 def _of_labelme(path: Path, shapes: list[Any]) -> Iterator[_Shape]:

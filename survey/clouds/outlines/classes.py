@@ -1,5 +1,6 @@
 """Pictures of labels that are none: classes instead of stones, resampled colours, white mortar; and bridged stones."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,9 @@ from numpy.typing import NDArray
 
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Bools, Ints
+from survey.formats.tables.kinds import KINDS, kind_of
 
-__all__ = ["check_stones", "neck", "of_class", "refuse_mortar"]
+__all__ = ["check_stones", "class_of_stones", "neck", "of_class", "refuse_mortar"]
 
 _PIECES = 4  # pieces of one number, of which none has half of its area, that make it a class
 _HALF = 0.5  # share of an area that is most of it [-]
@@ -51,6 +53,30 @@ def of_class(pixels: NDArray[Any], name: str, path: Path) -> Bools:
         remedy = f"the picture has {some}{', …' if len(there) > 8 else ''}"
         raise UsageError(f"no pixel is {name}", where=str(path), remedy=remedy)
     return found
+
+
+def class_of_stones(path: Path, counts: Mapping[str, int], label: str | None, what: str) -> str | None:
+    """Return the class of annotations that are stones; None: all are.
+
+    Parameters
+    ----------
+    path : of the annotations
+    counts : number of annotations by class
+    label : that the user has named
+    what : the classes are called, in the plural
+
+    Raises
+    ------
+    UsageError
+        if there is no such class, or none of several is named and they are not kinds of stones
+    """
+    listed = ", ".join(f"{name} ({count})" for name, count in counts.items())
+    if label is not None and label not in counts:
+        raise UsageError(f"no {label!r} among the {what}", where=str(path), remedy=f"{what} are: {listed}")
+    if label is None and len(counts) > 1 and not all(kind_of(name, {}) in KINDS for name in counts):
+        remedy = f"name that of the stones, e.g. --layer {max(counts, key=counts.__getitem__)}"
+        raise UsageError(f"{len(counts)} {what}: {listed}", where=str(path), remedy=remedy)
+    return label
 
 
 def check_stones(numbers: NDArray[np.int32], values: Ints, colours: bool, path: Path) -> None:

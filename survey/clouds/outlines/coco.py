@@ -1,7 +1,9 @@
 """Masks of segmentation programs in COCO's JSON: polygons, and run lengths plain or compressed, each with its score."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import SurveyError, UsageError
+from survey.clouds.outlines.classes import class_of_stones
 from survey.clouds.outlines.labels import outline_of_mask
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
 from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.world import PixelPlace, world_of
+from survey.formats.tables.kinds import KINDS, kind_of
 from survey.geometry.polygons import ring_area
 
 __all__ = ["is_coco", "load_json", "read_coco", "run_lengths"]
@@ -28,7 +32,7 @@ def is_coco(content: object) -> bool:
 
 
 def read_coco(
-    path: Path, content: Any, tolerance: float, chosen: Mapping[str, str]
+    path: Path, content: Any, tolerance: float, chosen: Mapping[str, str], category: str | None = None
 ) -> tuple[tuple[Outline, ...], PixelPlace | None, tuple[int, int] | None]:
     """Read the masks of one picture.
 
@@ -38,6 +42,7 @@ def read_coco(
     content : its JSON: a dataset, or a list of results
     tolerance : largest distance of the boundary of a mask from the sides of its outline [px]
     chosen : names of attributes that the user has given, by meaning
+    category : of the stones, where there are several; None: all
 
     Returns
     -------
@@ -46,8 +51,10 @@ def read_coco(
 
     Raises
     ------
+    UsageError
+        if there are masks of several pictures, or several categories of which none is chosen
     SurveyError
-        if there are masks of several pictures, or an annotation cannot be read
+        if an annotation cannot be read
     """
     annotations = content if isinstance(content, list) else content["annotations"]
     head = {} if isinstance(content, list) else content
@@ -63,10 +70,19 @@ def read_coco(
     image = images.get(next(iter(shown), None), {})
     size = (int(image["width"]), int(image["height"])) if {"width", "height"} <= set(image) else None
     kinds = {category.get("id"): str(category.get("name")) for category in head.get("categories", [])}
+    names = [_category(annotation, kinds) for annotation in annotations]
+    stones = class_of_stones(path, Counter(name for name in names if name), category, "categories")
+    annotations = [one for one, name in zip(annotations, names, strict=True) if stones in (None, name)]
     outlines = tuple(_outlines(path, annotations, kinds, size, tolerance, chosen))
     name = Path(str(image.get("file_name", path.name))).name
     places = world_of(path.with_name(name)) or world_of(path)
     return outlines, places, size
+
+
+def _category(annotation: Mapping[str, Any], names: Mapping[Any, str]) -> str:
+    """Return the name of the category of an annotation, else its number; nothing if it has none."""
+    number = annotation.get("category_id")
+    return "" if number is None else names.get(number, str(number))
 
 
 def _outlines(
@@ -88,6 +104,8 @@ def _outlines(
         if annotation.get("category_id") in kinds:
             values["category"] = kinds[annotation["category_id"]]
         attributes = attributes_of(values, chosen, where)
+        if attributes.kind is None and kind_of(name := _category(annotation, kinds), {}) in KINDS:
+            attributes = replace(attributes, kind=name)
         code = made_code(attributes.code or "") or f"S{number:03d}"
         if code.isdigit():
             code = f"S{int(code):03d}"

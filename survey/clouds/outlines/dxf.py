@@ -75,9 +75,38 @@ def read_dxf(
     scale = unit or _UNITS.get(code, 1.0)
     if not entities.curves:
         raise _empty(path, layer, entities)
-    curves = [replace(curve, ring=_flat(curve.ring * scale)) for curve in entities.curves]
+    drawn = _without_symbols(entities.curves)
+    curves = [replace(curve, ring=_flat(curve.ring * scale)) for curve in drawn]
     texts = [replace(text, places=tuple(scale * place for place in text.places)) for text in entities.texts]
-    return tuple(_coded(curves, texts, chosen, path)), tuple(_left_out(entities))
+    left = _left_out(entities, len(entities.curves) - len(drawn))
+    return tuple(_coded(curves, texts, chosen, path)), tuple(left)
+
+
+def _without_symbols(curves: Sequence[Curve]) -> list[Curve]:
+    """Return the curves without those that inserted labels are drawn with: each stands in the outline of a stone.
+
+    A label may be the stone itself, with its number. Then a curve around it is that of no stone, and holds other
+    labels too.
+    """
+    others = [curve for curve in curves if curve.label is None]
+    low, high = (
+        np.array([end(curve.ring, axis=0) for curve in others]).reshape(-1, 3) for end in (np.min, np.max)
+    )
+    size = (high - low).max(axis=1, initial=0.0)[:, None]
+    areas = np.array([_area(curve.ring) for curve in others])
+    around: dict[int, int] = {}
+    for k, curve in enumerate(curves):
+        if curve.label is None:
+            continue
+        middle = curve.ring.mean(axis=0)
+        near = ((middle > low - size) & (middle < high + size)).all(axis=1) & (areas > _area(curve.ring))
+        holders = [i for i in np.flatnonzero(near).tolist() if _is_inside(middle, others[i].ring)]
+        if holders:
+            around[k] = min(holders, key=lambda i: float(areas[i]))
+    held: dict[int, set[int | None]] = {}
+    for k, holder in around.items():
+        held.setdefault(holder, set()).add(curves[k].label)
+    return [curve for k, curve in enumerate(curves) if k not in around or len(held[around[k]]) >= _FRAMED]
 
 
 def _empty(path: Path, layer: str | None, entities: Entities) -> SurveyError:
@@ -91,7 +120,14 @@ def _empty(path: Path, layer: str | None, entities: Entities) -> SurveyError:
     return SurveyError(what, where=str(path), remedy=remedy)
 
 
-def _left_out(entities: Entities) -> Iterator[tuple[str, str]]:
+def _left_out(entities: Entities, symbols: int) -> Iterator[tuple[str, str]]:
+    if symbols:
+        yield "left out", f"{symbols} closed curves of labels, which stand in the outlines of stones"
+    if entities.hidden_texts:
+        yield (
+            "hidden",
+            f"texts on layers that are frozen or off are left out: {_listed(entities.hidden_texts)}",
+        )
     if entities.left:
         yield "left out", f"{_listed(entities.left)}: neither closed curves nor texts"
     if entities.hidden:
@@ -114,7 +150,7 @@ def _coded(
     wanted = chosen.get("code")
     by_layer = wanted == "layer" or (wanted is None and not texts and len(set(layers)) == len(layers) > 1)
     tags = {meaning: name for meaning, name in chosen.items() if name not in ("layer", "text")}
-    areas = [float(np.linalg.norm(area_vector(_in_space(curve.ring)))) for curve in curves]
+    areas = [_area(curve.ring) for curve in curves]
     smallest = sorted(range(len(curves)), key=lambda k: areas[k])
     labels: dict[int, list[DrawnText]] = {}
     around: Counter[int] = Counter()
@@ -159,6 +195,10 @@ def _outline(
 
 def _holders(place: Array, curves: Sequence[Curve], smallest: Sequence[int]) -> list[int]:
     return [k for k in smallest if _is_inside(place, curves[k].ring)]
+
+
+def _area(ring: Array) -> float:
+    return float(np.linalg.norm(area_vector(_in_space(ring))))
 
 
 def _in_space(ring: Array) -> Array:

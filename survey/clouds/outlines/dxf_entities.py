@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,13 @@ class Curve:
     ring : (n, 3) corners in drawing units, not closed
     layer : its layer; in a block on layer 0, that of the insert
     where : kind, handle and layer, for messages
+    label : number of the inserted label whose block it is of; None if of none
     """
 
     ring: Array
     layer: str
     where: str
+    label: int | None = None
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,14 @@ class Entities:
     texts : texts and labels
     left : number of other entities by kind
     hidden : number of closed curves by layer that is frozen or off
+    hidden_texts : number of texts and labels by layer that is frozen or off
     """
 
     curves: list[Curve] = field(default_factory=list)
     texts: list[DrawnText] = field(default_factory=list)
     left: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
+    hidden_texts: Counter[str] = field(default_factory=Counter)
 
 
 def entities_of(drawing: Any, layer: str | None) -> Entities:
@@ -81,12 +86,19 @@ def entities_of(drawing: Any, layer: str | None) -> Entities:
     layer : on which outlines lie, which may be hidden; None: all that are shown
     """
     entities = Entities()
-    hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_frozen() or layer.is_off()}
+    off = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_frozen() or layer.is_off()}
+    off -= {"" if layer is None else layer.lower()}
     hatches = list[Curve]()
-    for entity, on in _resolved(drawing.modelspace(), None, entities, 0):
+    for entity, on, label in _resolved(drawing.modelspace(), count(), 0):
         kind = entity.dxftype()
-        if kind in ("TEXT", "MTEXT"):
-            entities.texts.append(_text(entity))
+        hidden = on.lower() in off or (layer is None and bool(entity.dxf.get("invisible", 0)))
+        if kind in ("TEXT", "MTEXT", "INSERT"):
+            if kind == "INSERT" and label is None:  # deeper than blocks are followed
+                entities.left[kind] += 1
+            elif hidden:
+                entities.hidden_texts[on] += 1
+            else:
+                entities.texts.append(_label(entity) if kind == "INSERT" else _text(entity))
             continue
         if kind in _SILENT or (layer is not None and on.lower() != layer.lower()):
             continue
@@ -94,31 +106,39 @@ def entities_of(drawing: Any, layer: str | None) -> Entities:
         rings = _rings(entity)
         if not rings:
             entities.left[f"open {kind}" if kind in _CURVES else kind] += 1
-        elif layer is None and (on.lower() in hidden or entity.dxf.get("invisible", 0)):
+        elif hidden:
             entities.hidden[on] += len(rings)
         else:
-            (hatches if kind == "HATCH" else entities.curves).extend(Curve(ring, on, where) for ring in rings)
+            found = hatches if kind == "HATCH" else entities.curves
+            found.extend(Curve(ring, on, where, label) for ring in rings)
     boxes = [_box(curve.ring) for curve in entities.curves]
     # the filling of an outline is not a second stone
     entities.curves += [hatch for hatch in hatches if not any(_alike(_box(hatch.ring), box) for box in boxes)]
     return entities
 
 
-def _resolved(entities: Any, layer: str | None, found: Entities, depth: int) -> Iterator[tuple[Any, str]]:
-    """Yield entities with their layers, those of blocks at their places; labels become texts."""
+def _resolved(
+    entities: Any, numbers: Iterator[int], depth: int, layer: str | None = None, label: int | None = None
+) -> Iterator[tuple[Any, str, int | None]]:
+    """Yield entities with their layers, and the inserted label that they are of; those of blocks at their places.
+
+    An insert comes itself only where it is a label, with its own number, or lies too deep, with none.
+    """
     for entity in entities:
         name = str(entity.dxf.get("layer", "0"))
         on = layer if layer is not None and name == "0" else name
         if entity.dxftype() != "INSERT":
-            yield entity, on
+            yield entity, on, label
             continue
+        within = label
         if any(attribute.dxf.text.strip() for attribute in entity.attribs):
-            found.texts.append(_label(entity))
+            within = next(numbers)
+            yield entity, on, within
         if depth == _DEEPEST:
-            found.left["INSERT"] += 1
+            yield entity, on, None
             continue
         for one in entity.multi_insert() if entity.mcount > 1 else (entity,):
-            yield from _resolved(one.virtual_entities(), on, found, depth + 1)
+            yield from _resolved(one.virtual_entities(), numbers, depth + 1, on, within)
 
 
 def _text(entity: Any) -> DrawnText:

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from ground.errors import SurveyError, UsageError
+from ground.tables.columns import length_scale, plain, spellings, unit_of
 from survey.arrays import Array
+from survey.formats.tables.columns import ALIASES
 from survey.records.survey import DEPTH_ORIGINS
 
 __all__ = [
@@ -19,6 +21,7 @@ __all__ = [
     "Outline",
     "WrongOutline",
     "attributes_of",
+    "columns_of",
     "distinct",
     "field_map",
     "made_code",
@@ -27,30 +30,34 @@ __all__ = [
 FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "code": (
-            "code", "name", "id", "label", "stone", "block", "number", "nr", "no", "fid",
-            "stein", "steinnr", "steinnummer", "nummer", "bezeichnung",
-            "pierre", "numero", "nom", "bloc", "pietra", "concio", "codice", "nome", "blocco",
-            "piedra", "sillar", "codigo", "nombre", "bloque",
+            *ALIASES["block"], "code", "name", "label", "number", "nr", "no", "nummer", "bezeichnung", "numero",
+            "nom", "codice", "nome", "codigo", "nombre", "text", "id", "fid",
         ),
-        "kind": (
-            "kind", "type", "class", "art", "typ", "steinart", "klasse", "genre", "classe", "tipo", "clase",
-        ),
-        "course": ("course", "row", "layer", "lage", "schicht", "assise", "corso", "filare", "hilada"),
-        "zone": ("zone", "area", "wall", "facade", "bereich", "wand", "mur", "parete", "muro", "zona"),
-        "depth": ("depth", "tiefe", "profondeur", "profondita", "profundidad"),
-        "depth_sigma": ("depth_sigma", "sigma_depth"),
-        "depth_origin": ("depth_origin",),
-        "depth_source": ("depth_source",),
-        "sigma": ("sigma", "accuracy", "genauigkeit", "precision", "precisione"),
+        "kind": (*ALIASES["kind"], "class", "klasse", "classe"),
+        "course": tuple(ALIASES["course"]),
+        "zone": (*ALIASES["zone"], "area", "parete"),
+        "depth": tuple(ALIASES["depth"]),
+        "depth_sigma": tuple(ALIASES["depth_sigma"]),
+        "depth_origin": tuple(ALIASES["depth_origin"]),
+        "depth_source": tuple(ALIASES["depth_source"]),
+        "sigma": tuple(ALIASES["sigma"]),
         "score": ("score", "confidence", "probability"),
     }
 )  # fmt: skip
-"""Names under which attributes are known, in English, German, French, Italian and Spanish."""
+"""Names under which attributes are known: those of columns of tables, and more; in doubt the first.
+
+Numbers that a program gives to features, such as `id`, are codes only where nothing else is.
+"""
+
+_SPELLED = {
+    meaning: tuple(dict.fromkeys(spelling for name in (meaning, *names) for spelling in spellings(name)))
+    for meaning, names in FIELDS.items()
+}
+_PLACES = frozenset(("layer", "lage", "row", "reihe", "rang", "lit", "fila"))
+"""Names that mean other things than courses, too: the layer of a drawing, a place."""
 
 PROPOSED = "proposed from image"
 """Evidence of an outline that a program proposes: a hypothesis, until a person has looked at it."""
-
-_PLAIN = str.maketrans("àáâäãåçèéêëìíîïñòóôöõùúûü", "aaaaaaceeeeiiiinooooouuuu")
 
 
 @dataclass(frozen=True)
@@ -162,25 +169,32 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
     SurveyError
         if a chosen attribute is missing, or a value cannot be read
     """
-    columns = _columns(tuple(values), chosen, where)
+    columns = columns_of(tuple(values), chosen, where)
     texts = {meaning: _text(values[name]) for meaning, name in columns.items()}
     if "zone" not in chosen and _is_measure(texts.get("zone")):
         del texts["zone"], columns["zone"]  # an area that a program computed
+    if (
+        "course" not in chosen
+        and plain(columns.get("course", "")) in _PLACES
+        and not _is_count(texts["course"])
+    ):
+        del texts["course"], columns["course"]
     used = set(columns.values())
     notes = {
         _key(name): text[:200]
         for name, value in values.items()
         if name not in used and (text := _text(value)) is not None
     }
-    sigma = _number(texts, "sigma", where)
-    depth = _number(texts, "depth", where)
+    sigma, depth, depth_sigma = (
+        _length(texts, columns, meaning, where) for meaning in ("sigma", "depth", "depth_sigma")
+    )
     return Attributes(
         code=texts.get("code"),
         kind=texts.get("kind"),
         course=_course(texts.get("course"), where),
         zone=texts.get("zone"),
         depth=None if depth is None else _positive(depth, "depth", where),
-        depth_sigma=_number(texts, "depth_sigma", where),
+        depth_sigma=depth_sigma,
         depth_origin=None if depth is None else _origin(texts.get("depth_origin"), where),
         depth_source=None if depth is None else texts.get("depth_source"),
         sigma=None if sigma is None else _positive(sigma, "sigma", where),
@@ -201,10 +215,20 @@ def made_code(text: str) -> str:
     return re.sub(r"[^\w.+/:-]+", "-", plain.strip()).strip("-_")[:64].strip("-_")
 
 
-def _columns(names: Sequence[str], chosen: Mapping[str, str], where: str) -> dict[str, str]:
-    plain = {_plainly(name): name for name in reversed(names)}
+def columns_of(names: Sequence[str], chosen: Mapping[str, str], where: str) -> dict[str, str]:
+    """Find the names of attributes by what they mean.
+
+    Raises
+    ------
+    SurveyError
+        if a chosen one is missing
+    """
+    spelled: dict[str, str] = {}
+    for name in names:
+        for spelling in (plain(name), plain(unit_of(name)[0])):
+            spelled.setdefault(spelling, name)
     out = {}
-    for meaning, aliases in FIELDS.items():
+    for meaning, words in _SPELLED.items():
         if meaning in chosen:
             if chosen[meaning] not in names:
                 known = ", ".join(names) or "none"
@@ -213,15 +237,11 @@ def _columns(names: Sequence[str], chosen: Mapping[str, str], where: str) -> dic
                 )
             out[meaning] = chosen[meaning]
             continue
-        for alias in aliases:
-            if alias in plain and plain[alias] not in (*out.values(), *chosen.values()):
-                out[meaning] = plain[alias]
+        for spelling in words:
+            if spelling in spelled and spelled[spelling] not in (*out.values(), *chosen.values()):
+                out[meaning] = spelled[spelling]
                 break
     return out
-
-
-def _plainly(name: str) -> str:
-    return re.sub(r"[\s.°-]+", "", name.lower().translate(_PLAIN)) if name else name
 
 
 def _text(value: Any) -> str | None:
@@ -248,16 +268,33 @@ def _number(found: Mapping[str, str | None], meaning: str, where: str) -> float 
         ) from error
 
 
+def _length(
+    found: Mapping[str, str | None], columns: Mapping[str, str], meaning: str, where: str
+) -> float | None:
+    """Return a length [m], in the unit that the name of its attribute states; None if it is not stated."""
+    value = _number(found, meaning, where)
+    return None if value is None else (length_scale(columns[meaning], where) or 1.0) * value
+
+
 def _positive(value: float, meaning: str, where: str) -> float:
     if not 0.0 < value < 10.0:
         what = f"{meaning} is {value:g} m"
-        raise SurveyError(what, where=where, remedy="give it in metres, e.g. 0.3; or leave it empty")
+        raise SurveyError(
+            what,
+            where=where,
+            remedy=f"give it in metres, or name its unit, as in {meaning}_cm; or leave it empty",
+        )
     return value
 
 
 def _is_measure(text: str | None) -> bool:
     """Return whether a text is a decimal number."""
     return text is not None and re.fullmatch(r"-?\d*[.,]\d+(e-?\d+)?", text) is not None
+
+
+def _is_count(text: str | None) -> bool:
+    """Return whether a text is a whole number, or says nothing."""
+    return text is None or re.fullmatch(r"\d+(\.0*)?", text) is not None
 
 
 def _origin(text: str | None, where: str) -> str | None:

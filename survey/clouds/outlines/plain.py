@@ -1,4 +1,4 @@
-"""Outlines in plain JSON or CSV: corners in metres of the wall's plane, to the right and upwards."""
+"""Outlines in plain JSON or in tables: corners in metres of the wall's plane, to the right and upwards, or in space."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -8,16 +8,16 @@ import numpy as np
 
 from ground.errors import SurveyError
 from ground.tables import table as tables
-from ground.tables.columns import length_scale, unit_of
+from ground.tables.columns import COORDINATES, length_scale, places_of, unit_of
 from ground.tables.numbers import is_number
 from survey.arrays import Array
-from survey.clouds.outlines.outline import FIELDS, Outline, attributes_of, made_code
+from survey.clouds.outlines.outline import Outline, attributes_of, columns_of, made_code
 
 __all__ = ["is_plain", "read_plain_json", "read_table"]
 
 _JSON = 'give a list of objects such as {"code": "S1", "outline": [[0.1, 0.2], …]}'
 _CSV = "give a header with code, x and y, and a row for each corner, in order around its stone"
-_ACROSS, _UPWARD = ("x", "s", "u"), ("y", "z", "t", "v")
+_CORNERS = {**COORDINATES, "x": (*COORDINATES["x"], "s", "u"), "y": (*COORDINATES["y"], "t", "v")}
 
 
 def is_plain(content: object) -> bool:
@@ -80,50 +80,51 @@ def _entries(path: Path, content: list[Any], chosen: Mapping[str, str]) -> Itera
         yield Outline(number, _code(attributes.code, number), _open(ring), attributes, where)
 
 
-def read_table(path: Path, chosen: Mapping[str, str], unit: float | None = None) -> tuple[Outline, ...]:
-    """Read a table with a row for each corner.
+def read_table(
+    path: Path, chosen: Mapping[str, str], unit: float | None = None, sheet: str | None = None
+) -> tuple[Outline, ...]:
+    """Read a table with a row for each corner, in the plane of the wall, or in space where it has three coordinates.
 
     Parameters
     ----------
     path : text or a workbook, with names of columns, which may state a unit of length
     chosen : names of columns that the user has given, by meaning
     unit : length of the unit of corners, where columns state none [m]; None: metres
+    sheet : of a workbook with several
 
     Raises
     ------
     SurveyError
         naming the line that is wrong
     """
-    table = tables.read_table(path, _is_row, _CSV)
+    table = tables.read_table(path, _is_row, _CSV, sheet)
     header = table.titles[-1] if table.titles else tables.TableRow(1, ())
-    titles = [unit_of(cell)[0] for cell in header.cells]
-    places = {name.lower(): k for k, name in reversed(list(enumerate(titles)))}
-    across, upward, code = (
-        next((places[alias] for alias in alike if alias in places), None) for alike in _corners(chosen)
-    )
-    if across is None or upward is None or code is None:
-        names = ", ".join(header.cells or table.rows[0].cells)
-        raise SurveyError(f"columns {names}", where=table.where(header.line), remedy=_CSV)
-    scales = [length_scale(cell, table.where(header.line)) or 1.0 for cell in header.cells]
-    sides = [length_scale(cell, table.where(header.line)) or unit or 1.0 for cell in header.cells]
+    titles, where = header.cells, table.where(header.line)
+    at = places_of(titles, _CORNERS, where)
+    name = columns_of(titles, chosen, where).get("code") if titles else None
+    sides = [at[axis] for axis in "xyz" if axis in at]
+    if "x" not in at or len(sides) < 2 or name is None:
+        names = ", ".join(titles or table.rows[0].cells)
+        raise SurveyError(f"columns {names}", where=where, remedy=_CSV)
+    code = titles.index(name)
+    scales = [length_scale(titles[k], where) or unit or 1.0 for k in sides]
     corners: dict[str, list[list[float]]] = {}
     first: dict[str, tuple[int, dict[str, Any]]] = {}
     for row in table.rows:
         cells = [*row.cells, *[""] * (len(titles) - len(row.cells))]
-        place = [sides[k] * table.number(cells[k], titles[k], row.line) for k in (across, upward)]
-        name = table.name(row, code, "the stone of a corner")
-        corners.setdefault(name, []).append(place)
-        others: dict[str, Any] = {}
-        for k, (title, cell) in enumerate(zip(titles, cells, strict=False)):
-            if title and cell and k not in (across, upward):
-                others[title] = cell if scales[k] == 1.0 else scales[k] * table.number(cell, title, row.line)
-        first.setdefault(name, (row.line, others))
+        place = [
+            scale * table.number(cells[k], unit_of(titles[k])[0], row.line)
+            for scale, k in zip(scales, sides, strict=True)
+        ]
+        stone = table.name(row, code, "the stone of a corner")
+        corners.setdefault(stone, []).append(place)
+        others = {
+            title: cell
+            for k, (title, cell) in enumerate(zip(titles, cells, strict=False))
+            if title and cell and k not in sides
+        }
+        first.setdefault(stone, (row.line, others))
     return tuple(_of_rows(path, corners, first, chosen))
-
-
-def _corners(chosen: Mapping[str, str]) -> tuple[Sequence[str], ...]:
-    """Return the names of the columns of a corner: across, upward, and the stone."""
-    return _ACROSS, _UPWARD, (chosen["code"].lower(),) if "code" in chosen else FIELDS["code"]
 
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:

@@ -26,6 +26,9 @@ PICTURES = (".png", ".tif", ".tiff", ".bmp")
 """Endings of label pictures."""
 
 _VECTORS = (".gpkg", ".geojson", ".json", ".shp", ".fgb", ".kml", ".gml", ".sqlite")
+_TABLES = (".csv", ".txt", ".xlsx", ".ods", ".xls")
+_OF_FORMATS = ("layer", "label", "category")  # notes that readers make themselves
+_LONGEST = 200  # characters of names in a remark
 _DENSE = 12  # corners beyond which an outline was traced or drawn as a curve, and is described by fewer
 _LIKELY = 2.0  # standard deviations of a drawn corner that a curve may differ from its sides
 _FARTHEST = 1e8  # largest coordinate [m]
@@ -58,6 +61,17 @@ class Drawing:
     left: tuple[tuple[str, str], ...] = ()
     wrong: tuple[WrongOutline, ...] = ()
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Names of the attributes that are kept as notes, because nothing says what they are."""
+        names = dict.fromkeys(name for outline in self.outlines for name in outline.said.notes)
+        kept = ", ".join(name for name in names if name not in _OF_FORMATS)[:_LONGEST]
+        return (
+            (f"kept as notes: {kept}; --fields says what an attribute is, e.g. code=Stein_Nr",)
+            if kept
+            else ()
+        )
+
 
 def read_outlines(
     path: Path,
@@ -75,8 +89,8 @@ def read_outlines(
     Parameters
     ----------
     path : GeoPackage, GeoJSON, Shapefile, DXF, a picture of labels, JSON of COCO, labelme or VIA, plain JSON or CSV
-    layer : of a file with several; of a picture of classes, the number or colour of the stones; of annotations with
-        several labels, that of the stones
+    layer : of a file with several, or sheet of a workbook; of a picture of classes, the number or colour of the
+        stones; of annotations with several labels or categories, that of the stones
     chosen : names of attributes that the user has given, by meaning
     sigma : standard deviation of a drawn corner [m], to which curves are described by straight sides
     smooth : largest distance of the boundary of a mask from the sides of its outline [px]
@@ -123,24 +137,31 @@ def _read(
         placed = _placed(path, tuple(outlines_of(labels, smooth)), labels.places, size)
         return replace(placed, specks=labels.specks, smallest=labels.smallest)
     if ending == ".json" and is_coco(content := load_json(path)):
-        return _placed(path, *read_coco(path, content, smooth, chosen))
+        return _placed(path, *read_coco(path, content, smooth, chosen, layer))
     if ending == ".json" and is_annotated(content):
         return _placed(path, *read_annotations(path, content, smooth, chosen, layer))
     if ending == ".json" and is_plain(content):
         return _scaled(Drawing(path, read_plain_json(path, content, chosen)), unit)
-    if ending == ".csv":
-        return Drawing(path, read_table(path, chosen, unit))
-    if ending in _VECTORS:
-        features = read_vector(path, layer, chosen)
+    if ending in _TABLES and not _has_geometry(path):
+        return Drawing(path, read_table(path, chosen, unit, layer))
+    if ending in (*_VECTORS, ".csv"):
+        features = read_vector(path, layer, chosen, unit is not None)
         sound = tuple(feature for feature in features if isinstance(feature, Outline))
         wrong = tuple(feature for feature in features if isinstance(feature, WrongOutline))
         return _scaled(Drawing(path, sound, wrong=wrong), unit)
-    known = ", ".join((*_VECTORS, ".dxf", ".csv", *PICTURES))
+    known = ", ".join((*_VECTORS, ".dxf", *_TABLES, *PICTURES))
     raise UsageError(
         f"unknown ending {ending!r}",
         where=str(path),
         remedy=f"outlines are read from {known} and the .json of COCO, labelme and VIA",
     )
+
+
+def _has_geometry(path: Path) -> bool:
+    """Return whether a table has outlines as well-known text, in the column that GDAL writes first."""
+    with path.open("rb") as file:
+        first = file.readline(1000).removeprefix(b"\xef\xbb\xbf").lstrip(b'"').upper()
+    return path.suffix.lower() == ".csv" and first.startswith(b"WKT")
 
 
 def _scaled(drawing: Drawing, unit: float | None) -> Drawing:

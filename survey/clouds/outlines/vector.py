@@ -15,11 +15,12 @@ from survey.clouds.outlines.outline import Attributes, Outline, WrongOutline, at
 __all__ = ["read_vector"]
 
 _DEGREES = 1e-3  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
+_PIXELS = 30.0  # width of the usual outline from which it is of pixels: no stone is 30 m wide
 _SMALL = 0.02  # share of the area of the largest part up to which other parts are specks [-]
 
 
 def read_vector(
-    path: Path, layer: str | None, chosen: Mapping[str, str]
+    path: Path, layer: str | None, chosen: Mapping[str, str], scaled: bool = False
 ) -> tuple[Outline | WrongOutline, ...]:
     """Read the polygons of a file; an unclosed ring is closed.
 
@@ -28,13 +29,14 @@ def read_vector(
     path : the file
     layer : its name; None: the only one
     chosen : names of attributes that the user has given, by meaning
+    scaled : whether the user has stated the unit of its coordinates
 
     Raises
     ------
     UsageError
         if pyogrio or shapely is not installed, or there are several layers
     SurveyError
-        if the file cannot be read, or holds longitudes and latitudes
+        if the file cannot be read, or holds longitudes and latitudes, or pixels
     """
     pyogrio = optional("pyogrio", f"{path.suffix} files")
     shapely = optional("shapely", f"{path.suffix} files")
@@ -58,7 +60,10 @@ def read_vector(
         raise SurveyError(what, where=str(path), remedy="export it again, e.g. as GeoPackage") from error
     names = [str(name) for name in meta["fields"]]
     shapes = shapely.from_wkb(geometries, on_invalid="fix")
-    _check_degrees(path, shapely.bounds(shapes))
+    bounds = shapely.bounds(shapes)
+    _check_degrees(path, bounds)
+    if not scaled:
+        _check_pixels(path, bounds)
     out = []
     for k, shape in enumerate(shapes):
         where = f"{path}, feature {int(fids[k])}"
@@ -80,6 +85,21 @@ def _check_degrees(path: Path, bounds: Array) -> None:
             f"its coordinates are longitudes and latitudes: the largest outline is {extent:.1g} wide",
             where=str(path),
             remedy="export it in a projected system in metres (in QGIS: Export, Save Features As, CRS)",
+        )
+
+
+def _check_pixels(path: Path, bounds: Array) -> None:
+    """Refuse outlines that were drawn on a picture without a world file, which GIS show below zero, by pixels."""
+    finite = bounds[np.isfinite(bounds).all(axis=1)]
+    if not len(finite) or finite[:, 0].min() < -1.0 or finite[:, 3].max() > 1.0:
+        return
+    size = float(np.median(finite[:, 2:] - finite[:, :2]))
+    if size > _PIXELS:
+        raise SurveyError(
+            f"its outlines lie below zero and are {size:.0f} wide: pixels of a picture without a world file, it seems",
+            where=str(path),
+            remedy="scale them by the size of a pixel in metres (in QGIS: Affine transform, the same scale for x and "
+            "y); if it is a millimetre, give --unit mm",
         )
 
 

@@ -11,7 +11,8 @@ from survey.arrays import Array
 __all__ = ["FLAT", "outline_of", "ring_of"]
 
 FLAT = (
-    "export outlines with z (PolygonZ, 3D); outlines in the plane of a picture need a cloud or a wall's frame"
+    "export outlines with z (PolygonZ, 3D); outlines in the plane of a wall are read by --outlines FILE, with --depth "
+    "or with --cloud"
 )
 """Remedy for outlines in two dimensions."""
 
