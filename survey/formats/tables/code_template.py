@@ -3,7 +3,8 @@
 A template is text with fields in braces, e.g. ``{block}:{role}`` or ``{block} {kind} {course?} {role}``; the text
 between them stands for itself, a blank for one or more. A field with a question mark may be missing, together with the
 text before it; ``{*}`` is read and ignored. A description has one reading or none: an ambiguous template is refused.
-Where the name of a stone is made of its zone, course and number, ``{number}`` takes the place of ``{block}``.
+Where the name of a stone is made of its zone, course and number, ``{number}`` takes the place of ``{block}``. A role
+may follow a name at once, as in ``12-4E``: then the name ends in a digit.
 """
 
 import re
@@ -49,23 +50,33 @@ _FIELDS = {  # pattern of each field, and its characters
     "number": (r"[0-9]{1,6}[^\W\d_]?", r"^\W_"),
     "role": (rf"(?i:{_ROLE_WORDS})", _ROLE_LETTERS + _ROLE_LETTERS.upper()),
 }
+_JOINED = ("block", "course", "number")  # fields that end in a digit where a role follows at once
 _NAMED = ("zone", "course", "number")  # fields that name a stone together
 _WORD = r"[0-9]{1,6}|[^\W\d_]{1,8}", r"^\W_"  # a course of these, or a word where there is none, as in arches
 _IGNORED = "*"
 _FIELD = re.compile(r"\{([^{}]*)\}")
 _REMEDY = "write e.g. {block}:{role} or {block} {kind} {course} {role}"
+_MARKS = " /;,|:"  # which separate fields, and are in few names
+_LONG = (("{block}", "{kind}", "{course}", "{role}"), ("{block}", "{course}", "{kind}", "{role}"))
+_SHORT = (("{block}", "{kind}", "{role}"), ("{block}", "{role}"), ("{block}", "{course}", "{role}"))
 _USUAL = (
     *(
         f"{zone}{{course}}{mark}{{number}}{mark}{{kind}}{mark}{{role}}"
         for mark in "._/-"
         for zone in (f"{{zone}}{mark}", "")
     ),
-    *("{block}:{role}", "{block} {role}", "{block} {kind} {role}", "{block} {kind} {course} {role}"),
-    *("{block} {kind} {course?} {role}", "{block} {course} {role}", "{block}:{kind}:{role}"),
-    *("{block}.{kind}.{role}", "{block}_{role}", "{block}-{role}", "{block}.{role}", "{block},{role}"),
-    *("{block};{role}", "{role} {block}", "{role}:{block}", "{block} {kind}", "{kind} {block} {role}"),
-    *("{kind} {block}", "{block}:{role} {*}", "{block} {role} {*}", "{block} {kind} {role} {*}"),
-    *("{block}", "{block} {*}"),
+    *(mark.join(fields) for mark in _MARKS for fields in _LONG),
+    *(mark.join(fields) for mark in _MARKS for fields in _SHORT),
+    *("{block} {kind} {course?} {role}", "{block}.{kind}.{role}"),
+    *("{block}_{role}", "{block}-{role}", "{block}.{role}", "{role} {block}", "{role}:{block}"),
+    *(
+        "{block} {kind}",
+        "{kind} {block} {role}",
+        "{kind} {block}",
+        "{block}:{role} {*}",
+        "{block} {role} {*}",
+    ),
+    *("{block} {kind} {role} {*}", "{block}{role}", "{block}{role} {*}", "{block}", "{block} {*}"),
 )
 _CORNERS = 3  # of the smallest stone
 
@@ -208,8 +219,10 @@ class CodeTemplate:
                 remedy="separate them by a character that neither of them has, such as a blank",
             )
         pattern = _literal(first)
-        for name, literal in zip(names, [*between, last], strict=True):
-            if name == _IGNORED:
+        for name, literal, after in zip(names, [*between, last], [*names[1:], ""], strict=True):
+            if _is_joined(name, literal, after):
+                pattern += f"(?P<{name}>{fields[name][0]}(?<=[0-9]))"
+            elif name == _IGNORED:
                 pattern += (rf"[^{re.escape(literal[0])}]*" if literal else ".*") + _literal(literal)
             else:
                 pattern += f"(?P<{name}>{fields[name][0]}){_literal(literal)}"
@@ -239,8 +252,10 @@ def _is_sensible(text: str, rows: Sequence[CodeFields | None]) -> bool:
     fields = [row for row in rows if row is not None and code_of(row.block)]
     if len(fields) < len(rows):
         return False
-    counts = Counter(row.block for row in fields if row.role == "vertex")
-    return "{role}" in text or max(counts.values(), default=0) >= _CORNERS
+    corners = Counter(row.block for row in fields if row.role == "vertex")
+    if "{block}{role}" in text:  # the letter tells points from corners, and is no letter of the name
+        return any(row.role == "point" and corners[row.block] for row in fields)
+    return "{role}" in text or max(corners.values(), default=0) >= _CORNERS
 
 
 Fields = Mapping[str, tuple[str, str]]
@@ -254,7 +269,7 @@ def _unclear(fields: Fields, names: Sequence[str], between: Sequence[str]) -> tu
     """
     names, between = list(names), list(between)
     while between:
-        if _ends(fields, names[0], between[0]):
+        if _ends(fields, names[0], between[0]) or _is_joined(names[0], between[0], names[1]):
             del names[0], between[0]
         elif _ends(fields, names[-1], between[-1]):
             del names[-1], between[-1]
@@ -272,6 +287,11 @@ def _ends(fields: Fields, field: str, literal: str) -> bool:
         return bool(literal)
     character = re.compile(f"[{fields[field][1]}]")
     return any(character.fullmatch(character_text) is None for character_text in literal)
+
+
+def _is_joined(field: str, literal: str, after: str) -> bool:
+    """Return whether a role follows a name at once; the digits end where its letters begin."""
+    return not literal and after == "role" and field in _JOINED
 
 
 def _literal(text: str) -> str:

@@ -8,7 +8,6 @@ of a stone may lie anywhere. Empty fields mean "not known".
 """
 
 import math
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
@@ -21,7 +20,7 @@ import numpy as np
 from ground.errors import SurveyError
 from ground.tables.columns import plain
 from ground.tables.decimals import Decimals
-from ground.tables.numbers import EMPTY, shown
+from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
@@ -43,6 +42,7 @@ from survey.formats.tables.code_template import (
     role_of,
 )
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map
+from survey.formats.tables.first_rows import check_stones_repeat, note_key, with_role, with_units
 from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
 from survey.formats.tables.wkt import outline_of
@@ -87,10 +87,6 @@ _CACHED = 4096  # identities
 _LONGEST_NAME = 64
 _UNKNOWN = EMPTY | {""}
 _NOTHING = float("nan")
-_ROLE_WORDS = frozenset(
-    role for role in ROLES if len(role) > 1 or role in "vp"
-)  # other letters may number points
-
 AnyRows = TextRows | ListRows
 
 
@@ -125,8 +121,9 @@ def open_table(path: Path, rows: AnyRows, options: ReadingOptions) -> SurveyStre
     ahead = list(islice(iterator, _LOOK_AHEAD))
     column_map = read_map(options.columns)
     header, columns = _find_header(rows, ahead, column_map, options.codes is not None)
-    titles = ahead[:header] if not {"x", "y"} & set(column_map.names) else ()
-    return _read(path, rows, chain(ahead[header:], iterator), columns, options, titles=titles)
+    units, columns = with_units(rows, ahead[header:], columns)
+    data = chain(ahead[header + units :], iterator)
+    return _read(path, rows, data, columns, options, titles=ahead[:header])
 
 
 def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
@@ -183,10 +180,23 @@ def _opened_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream
     columns = Columns(5, {name: k for k, name in enumerate(_LIST[form])})
     if ahead[header:]:
         rows.delimiter = _list_delimiter(rows, ahead[header:])
+        header += _further_titles(rows, ahead[header:])
         if header:
             _check_axes(rows, ahead[header - 1], form)
     titles = ahead[:header]
     return _read(path, rows, chain(ahead[header:], iterator), columns, options, form, titles)
+
+
+def _further_titles(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> int:
+    """Return the number of rows before the first point that have one number at most where coordinates stand."""
+    for count, (number, row) in enumerate(ahead[:_TITLES]):
+        try:
+            cells = rows.cells(row, number, 5)
+        except SurveyError:  # told when the row is read
+            return count
+        if sum(is_number(cell, rows.delimiter != ",") for cell in cells[1:4]) > 1:
+            return count
+    return 0
 
 
 def _has_digits(row: Row) -> bool:
@@ -212,6 +222,9 @@ def _read(
     if not first:
         what = "list has no points" if form else "table has no points"
         raise rows.fail(rows.end, f"the {what}", "add one line per point")
+    if not form and "block" in columns.at and "outline" not in columns.at:
+        names = rows.cells(titles[-1][1], titles[-1][0]) if titles else ()
+        check_stones_repeat(rows.path, columns, names, collector.table.stones, options.columns)
     head = collector.head
     doubt = _order_remarks(rows, collector, columns, options, form, titles)
     remarks = (*rows.remarks, *reader.remarks, *collector.remarks, *doubt)
@@ -232,14 +245,15 @@ def _find_header(
                 names = rows.cells(row, number)
                 recognised = sum(kind_of_column(name) is not None for name in names if name)
                 where = f"{rows.path}:{number}" if number else rows.path
-                columns = find_columns(names, column_map, where, codes)
+                told = with_role(rows, ahead[k + 1 :], names, column_map, codes) if recognised else column_map
+                columns = find_columns(names, told, where, codes)
             except SurveyError as error:
                 if best is None or recognised > best[0]:
                     best = recognised, error
                 continue
             if column_map.numbered and _is_data(rows, names, columns, number):
                 return k, replace(columns, notes=())
-            return k + 1, _with_roles(rows, ahead[k + 1 :], columns, column_map)
+            return k + 1, columns
     rows.delimiter = stated
     if best is None:
         raise rows.fail(rows.end, "the table is empty: no column 'block'", "begin it with e.g. block,x,y,z")
@@ -261,30 +275,6 @@ def _check_named(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> None:
                 "give --format pnezd if the northing comes first, or --format penzd if the easting does",
             )
     rows.delimiter = stated
-
-
-def _with_roles(
-    rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns, column_map: ColumnMap
-) -> Columns:
-    """Return the columns with the one whose values are all roles of points as the role, whatever its name."""
-    if {"role", "description"} & set(columns.at):
-        return columns
-    free = [k for k, _ in columns.notes] + (
-        [columns.at["name"]] if "name" in columns.at.keys() - column_map.names else []
-    )
-    texts: dict[int, set[str]] = {k: set() for k in free}
-    for number, row in ahead:
-        try:
-            values = rows.cells(row, number)
-        except SurveyError:  # told when the row is read
-            continue
-        for k in free:
-            texts[k].add(values[k].casefold() if k < len(values) else "")
-    roles = [k for k, words in texts.items() if words and words <= _ROLE_WORDS]
-    if len(roles) != 1:
-        return columns
-    at = {what: k for what, k in columns.at.items() if k != roles[0]} | {"role": roles[0]}
-    return replace(columns, at=at, notes=tuple(note for note in columns.notes if note[0] != roles[0]))
 
 
 def _is_data(rows: AnyRows, names: Sequence[str], columns: Columns, number: int) -> bool:
@@ -357,7 +347,7 @@ def _order_remarks(
     titles: Sequence[tuple[int, Any]],
 ) -> tuple[str, ...]:
     """Refuse a list that speaks against the order of its axes; return a remark if nothing in it tells the order."""
-    names = _axis_names(rows, columns, titles)
+    names = [] if {"x", "y"} & read_map(options.columns).names.keys() else _axis_names(rows, columns, titles)
     if not form and [plain(name) for name in names] != ["x", "y"]:
         return ()  # names of columns tell the axes, as easting and northing do
     if form and [kind_of_column(name) for name in names] == ["x", "y"] and plain(names[0]) != "x":
@@ -670,7 +660,7 @@ class _RowReader:
         self._place = None if self._outline_at is not None else itemgetter(at["x"], at["y"], at["z"])
         self._name_at, self._sigma_at = at.get("name"), at.get("sigma")
         self._of_stones = [(column, at[column]) for column in _OF_STONES if column in at]
-        self._notes = [(k, _note_key(name)) for k, name in columns.notes]
+        self._notes = [(k, note_key(name)) for k, name in columns.notes]
         unit = options.scale
         self._scale = {
             column: columns.scales.get(column, unit) for column in (*"xyz", "sigma", "depth", "depth_sigma")
@@ -839,8 +829,3 @@ class _RowReader:
             if parsed is not None and parsed.role != STATION and CODE.fullmatch(parsed.block):
                 return parsed.block
         return None
-
-
-def _note_key(name: str) -> str:
-    """Return the key of a note, one word, from the name of a column."""
-    return re.sub(r"[^\w-]+", "_", name.strip()).strip("_").lower() or "note"

@@ -121,6 +121,9 @@ def test_a_description_may_hold_separators_and_say_more(tmp_path: Path) -> None:
         (NUMBERED.replace(".", "-"), "NW-07-12a-L-E", CodeFields("NW-07-12a", "l", 7, "NW", "vertex")),
         ("{course}_{number}_{kind}_{role}", "07_03_L_E", CodeFields("07_03", "l", 7, None, "vertex")),
         ("{number} {role}", "12 v", CodeFields("12", None, None, None, "vertex")),
+        ("{block}{role}", "05-04E", CodeFields("05-04", None, None, None, "vertex")),
+        ("{course}-{number}{role}", "5-4F", CodeFields("5-4", None, 5, None, "point")),
+        ("{block}{role}", "B4a", None),
     ],
 )
 def test_a_template_takes_a_description_apart(
@@ -134,7 +137,8 @@ def test_a_template_takes_a_description_apart(
     [
         ("{kind}:{role}", "no {block}"),
         ("", "no {block}"),
-        ("{block}{role}", "two ways"),
+        ("{block}{kind}", "two ways"),
+        ("{role}{block}", "two ways"),
         ("{block}-{kind}", "two ways"),
         ("{block}-{course}-{zone}", "two ways"),
         ("{block}/{zone}", "two ways"),

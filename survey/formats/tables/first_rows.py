@@ -1,0 +1,126 @@
+"""Reading of the rows beneath the names of columns: units, roles by their values, numbers taken for stones."""
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from ground.errors import SurveyError
+from ground.tables.columns import UNITS, length_unit
+from ground.tables.numbers import EMPTY, shown
+from ground.tables.rows import ListRows, TextRows
+from survey.formats.tables.code_template import ROLES, CodeTemplate
+from survey.formats.tables.columns import ColumnMap, Columns, kind_of_column
+from survey.formats.tables.point_table import TableStone
+
+__all__ = ["check_stones_repeat", "note_key", "with_role", "with_units"]
+
+AnyRows = TextRows | ListRows
+
+_ROLE_WORDS = frozenset(
+    role for role in ROLES if len(role) > 1 or role in "vp"
+)  # other letters may number points
+_FEWEST = 4  # rows from which a table of a stone for each row is one of points without stones
+_REPEATS = 3  # rows of a stone, at least
+_NO_CODE = "{block}:{role}:{kind}"  # a template beside which all usual ones are tried
+_ADVISED = re.compile(r'--codes "[^"]*"')
+
+
+def with_role(
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], names: Sequence[str], column_map: ColumnMap, codes: bool
+) -> ColumnMap:
+    """Return the map of the columns with the one whose values are all roles of points as the role.
+
+    It may have any name, also one of kinds, numbers or names of points.
+    """
+    known = [kind_of_column(name) if name else "" for name in names]
+    if "role" in (*known, *column_map.names) or column_map.numbered or (codes and "description" in known):
+        return column_map
+    free = [
+        k for k, what in enumerate(known) if what in (None, "kind", "name") and names.count(names[k]) == 1
+    ]
+    free = [k for k in free if names[k] not in column_map.names.values()]
+    words: dict[int, set[str]] = {k: set() for k in free}
+    for i, (number, row) in enumerate(ahead):
+        with suppress(SurveyError):  # told when the row is read
+            values = rows.cells(row, number)
+            for k in free:
+                word = values[k].casefold() if k < len(values) else ""
+                words[k] |= {word} if word or i else set()  # the first row may hold units
+    roles = [k for k in free if words[k] and words[k] <= _ROLE_WORDS]
+    if len(roles) != 1:
+        return column_map
+    return replace(column_map, names={**column_map.names, "role": names[roles[0]]})
+
+
+def with_units(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns) -> tuple[int, Columns]:
+    """Return the number of rows that state units, one or none, and the columns with them."""
+    if not ahead or not {*"xyz"} <= columns.at.keys():
+        return 0, columns
+    number, row = ahead[0]
+    try:
+        values = [*rows.cells(row, number), *[""] * columns.count]
+    except SurveyError:  # told when the row is read
+        return 0, columns
+    stated = {what: _unit(values[k]) for what, k in columns.at.items()}
+    name = values[columns.at["block"]] if "block" in columns.at else ""
+    if not all(stated[axis] for axis in "xyz") or name.lower() not in EMPTY | {""}:
+        return 0, columns
+    return 1, replace(
+        columns, scales={**columns.scales, **{k: UNITS[unit] for k, unit in stated.items() if unit}}
+    )
+
+
+def _unit(text: str) -> str | None:
+    """Return the unit of length that a cell states, such as [m] or m a.s.l.; None if it states none."""
+    words = text.strip("[]() ").split()
+    return length_unit(words[0]) if words else None
+
+
+def check_stones_repeat(
+    path: str,
+    columns: Columns,
+    names: Sequence[str],
+    stones: Mapping[str, TableStone],
+    column_map: str | None,
+) -> None:
+    """Refuse a table in which every row is a stone of its own: its column of stones numbers the points.
+
+    Parameters
+    ----------
+    path : of the table, for errors
+    columns, names : of the table
+    stones : that were read
+    column_map : as the user gave it
+
+    Raises
+    ------
+    SurveyError
+        with the column that repeats as names of stones do, or that holds codes
+    """
+    sound = [stone for stone in stones.values() if stone.error is None]
+    if len(sound) < _FEWEST or any(len(one.vertices) + len(one.points) > 3 for one in sound):
+        return
+    before = f"{column_map}," if column_map else ""
+    remedy = 'name the column of the stones, e.g. --columns "block=…"'
+    for _, name in columns.notes:
+        texts = [next(iter((one.notes or {}).get(note_key(name), {})), "") for one in sound]
+        if not all(texts):
+            continue
+        advice = _ADVISED.search(CodeTemplate(_NO_CODE).expected(texts[0], texts[1:]))
+        if advice is not None and "{role}" in advice[0]:
+            remedy = f'if {shown(name)} holds codes, give --columns "{before}description={name}" {advice[0]}'
+            break
+        if len(texts) >= _REPEATS * len(set(texts)) > _REPEATS:
+            remedy = f'name the column of the stones: --columns "{before}block={name}"'
+            break
+    at = columns.at["block"]
+    what = shown(names[at]) if at < len(names) else str(at + 1)
+    raise SurveyError(f"each of {len(sound)} rows is a stone of its own: column {what} numbers the points",
+                      where=path, remedy=remedy)  # fmt: skip
+
+
+def note_key(name: str) -> str:
+    """Return the key of a note, one word, from the name of a column."""
+    return re.sub(r"[^\w-]+", "_", name.strip()).strip("_").lower() or "note"
