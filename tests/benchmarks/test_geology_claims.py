@@ -10,6 +10,7 @@ from benchmarks.claims import Run, verdict_of
 from benchmarks.claims_fault import FAULT
 from benchmarks.claims_fold import FOLD
 from benchmarks.geology_claims import findings, rows_of
+from benchmarks.geology_scales import shear_by_height
 
 TIME = np.linspace(0.0, 1.0, 201)[1:]
 CLAIMS = {(claim.kind, claim.name): claim for claim in (*FOLD, *FAULT)}
@@ -188,3 +189,14 @@ def test_a_measure_that_some_motions_do_not_determine_says_of_how_many_seeds_it_
     runs = [{"P/S": 0.5}, {"P/S": 0.7}, {}]
     assert geology._determined(runs, "P/S", 1) == "0.6 ± 0.1 (2 seeds)"
     assert geology._determined([{}], "P/S", 1) == "not determined"
+
+
+def test_shear_is_told_by_height_in_diameters():
+    """Within each band x grows with the height, at another rate."""
+    rates = (13.0, 3.0, 1.5, 1.0)
+    start = np.random.default_rng(1).uniform(0.0, 15.0, (4000, 2))
+    band = np.searchsorted((1.5, 3.0, 5.0, 10.0), start[:, 1]) - 1
+    chosen = band >= 0
+    start, rate = start[chosen], np.array(rates)[band[chosen]]
+    now = np.column_stack([start[:, 0] + rate * start[:, 1], start[:, 1]])
+    assert shear_by_height(0.2 * start, 0.2 * now, 0.2) == pytest.approx(rates)
