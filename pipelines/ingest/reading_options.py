@@ -153,7 +153,7 @@ def reading_options(
     if header is not None:
         if not header.is_file():
             raise UsageError("no such file", where=str(header), remedy="name a header file with --header")
-        options = with_header(options, header)
+        options = _with_kinds(with_header(options, header))
     if sigma is not None:
         if not 0.0 < sigma < 1.0:
             raise UsageError(f"sigma is {sigma:g} m", where="--sigma", remedy="give it in metres, e.g. 0.003")
@@ -164,6 +164,16 @@ def reading_options(
             raise UsageError(what, where="--unit", remedy=remedy)
         options = replace(options, unit=UNITS[unit_name])
     return options
+
+
+def _with_kinds(options: ReadingOptions) -> ReadingOptions:
+    """Return options whose header has kinds in place of the abbreviations that the user has told."""
+    head, kinds = options.head, options.kinds
+    if head is None or not kinds:
+        return options
+    rules = tuple(replace(rule, kind=kinds.get(rule.kind or "", rule.kind)) for rule in head.depth_rules)
+    canons = tuple(replace(canon, kind=kinds.get(canon.kind, canon.kind)) for canon in head.canons)
+    return replace(options, head=replace(head, depth_rules=rules, canons=canons))
 
 
 def solid_options(

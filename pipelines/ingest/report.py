@@ -201,10 +201,17 @@ class Tally:
             solids=self._solids(),
             remarks=self.changed,
             doubts=self.doubts,
-            reading=self.stream.remarks,
+            reading=(*self.stream.remarks, *self._unused_rules()),
             questions=tuple(f"{question.what}: {question.remedy}" for question in self.questions()),
             review=self.stream.review,
         )
+
+    def _unused_rules(self) -> Iterator[str]:
+        """Yield remarks on depths that are stated for kinds of which there is no stone: a slip, or another part."""
+        rules = [rule for rule in self.stream.head.depth_rules if rule.kind not in (None, *self.stones)]
+        if rules and self.stones:
+            named = ", ".join(f"{rule.kind} (line {rule.line})" for rule in rules)
+            yield f"depths are stated for kinds without a stone: {named}; kinds are {', '.join(sorted(self.stones))}"
 
     def questions(self) -> Iterator[Question]:
         """Ask for the unit if most stones are of an impossible size, and for the axis if they lie on their side."""

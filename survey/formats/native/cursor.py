@@ -6,6 +6,7 @@ from re import Pattern
 from ground.errors import SurveyError
 from ground.tables.numbers import parse_length, parse_number, shown
 from survey.formats.fields import CODE, KIND, parse_course
+from survey.formats.tables.kinds import kind_of
 
 __all__ = ["NAME_REMEDY", "Cursor"]
 
@@ -77,8 +78,8 @@ class Cursor:
         return self.matching(CODE, what, NAME_REMEDY)
 
     def kind(self) -> str:
-        """Consume the name of a kind of stone, in upper or lower case."""
-        word = self.word().lower()
+        """Consume the name of a kind of stone, in upper or lower case and in any language of tables."""
+        word = kind_of(self.word(), {})
         if KIND.fullmatch(word) is None:
             raise self.fail(f"kind {shown(word)} is not a kind", "use letters, e.g. header")
         return word

@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 
 from ground.statistics.scale import spread
 from survey.arrays import Array
+from survey.quality.departures.bulges import bulge_profile, with_extent_and_profile
 from survey.quality.departures.shapes import (
     FINEST,
     LEAST,
@@ -58,6 +59,7 @@ _MIN_MOVED_STONES = 3  # stones that a shape must move
 _MAX_ROUNDS = 3  # of odd stones and movements in turn, until the odd stones stay the same
 _BESIDE = 1.0  # of the median size of a stone: distance from a straight joint to which a crack zigzags
 _TRIALS = 12  # by which the place of a shape is sharpened
+_STEP = 0.1  # of the median size of a stone: step of the derivatives of a bulge by its places
 
 
 class FaceKind(StrEnum):
@@ -327,7 +329,8 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
             break
     if len(movements) >= MOST:  # as many shapes as are looked for leave some still: these faces make no plane
         movements, lower = [], None
-    told = tuple(_told(name, zone, sound_face, movement) for movement in movements)
+    judged = _judged_bulges(sound_face, _sample(sound_face, scatter, freedom, tilt), movements)
+    told = tuple(_told(name, zone, sound_face, movement) for movement in judged)
     plane, plumb, lean, sigma = _departures(face, sound, scatter)
     return WallFace(
         name,
@@ -461,23 +464,41 @@ def _movements(
     if len(face.codes) < _WALL or not shapes:
         return [], None
     columns = np.column_stack([_field(shape, face) for shape in shapes])
-    height = face.up - face.up.mean()
-    sample = Sample(
-        face.out,
-        face.sigma**2 + scatter**2,
-        face.along,
-        face.up,
-        np.zeros(len(face.codes), dtype=np.intp),
-        np.column_stack([np.ones(len(face.codes)), face.along - face.along.mean()]),
-        tilt * height,
-        freedom,
-    )
+    sample = _sample(face, scatter, freedom, tilt)
     found, limit = fit_shapes(sample, shapes, columns, [(0, 0)], alpha, _sharpener(face))
     sigma = powers(
         sample, columns[:, [k for k, shape in enumerate(shapes) if shape.name in ("lean", "bulge")]], (0, 0)
     )
     sigma = sigma[np.isfinite(sigma)]
     return found, (limit + LIKELY) * float(sigma.max()) if len(sigma) else None
+
+
+def _sample(face: _Face, scatter: float, freedom: float, tilt: float) -> Sample:
+    """Return the departures of a wall's faces, whose place and direction along the facade are free."""
+    return Sample(
+        face.out,
+        face.sigma**2 + scatter**2,
+        face.along,
+        face.up,
+        np.zeros(len(face.codes), dtype=np.intp),
+        np.column_stack([np.ones(len(face.codes)), face.along - face.along.mean()]),
+        tilt * (face.up - face.up.mean()),
+        freedom,
+    )
+
+
+def _judged_bulges(face: _Face, sample: Sample, movements: Sequence[Found]) -> list[Found]:
+    """Return movements, bulges with what their extent and profile leave open, the others taken out."""
+    judged = []
+    for movement in movements:
+        if movement.shape.name == "local bulge":
+            others = sum(
+                (o.amount * o.field for o in movements if o is not movement), np.zeros(len(sample.values))
+            )
+            rest = replace(sample, values=sample.values - others)
+            movement = with_extent_and_profile(rest, movement, _STEP * face.size)
+        judged.append(movement)
+    return judged
 
 
 def _shapes(face: _Face) -> Iterator[Shape]:
@@ -549,8 +570,7 @@ def _field(shape: Shape, face: _Face) -> Array:
     elif shape.name == "setback":
         values = (z > at[0]).astype(float)
     elif shape.name == "local bulge":
-        away = np.minimum(np.hypot(s - at[0], z - at[1]) / at[2], 1.0)
-        values = np.cos(0.5 * math.pi * away) ** 2
+        values = bulge_profile(at, s, z)
     elif shape.name == "leaning part":
         values = ((s >= at[0]) & (s <= at[1])) * (z - at[2]) / (at[3] - at[2])
     else:

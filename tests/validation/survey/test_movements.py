@@ -109,6 +109,32 @@ def test_one_stone_out_of_the_face_is_found(amount: float):
     assert found.face.movements == ()
 
 
+def ending(amount: float, at: tuple[float, float], radius: float) -> Movement:
+    """Push a round part of the wall outwards, to a sharp end at its radius."""
+
+    def moved(places: np.ndarray, course: int) -> np.ndarray:
+        away = np.minimum(np.hypot(places[:, 0] - at[0], places[:, 2] - at[1]) / radius, 1.0)
+        out = amount * np.cos(0.5 * np.pi * away) ** 2
+        return np.column_stack([0.0 * out, out, 0.0 * out])
+
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("seed", "moved", "amount"),
+    [
+        (1000, bulging(5.0 * NOISE, (3.0, 1.5), 1.5), 5.0 * NOISE),  # its fit alone tells 10.0 ± 0.9 mm
+        (1009, bulging(5.0 * NOISE, (3.0, 1.5), 1.5), 5.0 * NOISE),
+        (1002, ending(7.0 * NOISE, (3.0, 1.5), 1.5), 7.0 * NOISE),
+    ],
+)
+def test_the_sigma_of_a_bulge_holds_its_extent_and_its_profile(seed: int, moved: Movement, amount: float):
+    (one,) = findings(survey_of(seed, moved=moved)).face.movements
+    assert one.kind == "local bulge"
+    assert abs(one.amount - amount) < 3.0 * one.sigma
+    assert 3.0 * one.sigma < abs(one.amount)
+
+
 def test_wrong_depths_are_found_and_lead_the_list():
     found = findings(survey_of(25, Wall(depths={"5-2": 0.05, "8-4": 5.0}, depth=0.5)))
     assert {one.code for one in found.depths} == {"5-2", "8-4"}
@@ -161,6 +187,32 @@ def test_each_kind_of_movement_is_found_and_named_in_nearly_all_surveys(
     named = sum(found(findings(survey_of(1000 + seed, wall, moved, proud))) for seed in range(60))
     print(f"{named} of 60")
     assert named >= 57
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wall", "moved", "proud", "amount"),
+    [
+        (Wall(), settled_pier(3.0 * NOISE, 3.6, 9.0, 7), {}, -3.0 * NOISE),
+        (Wall(opening=None), settled_pier(3.0 * NOISE, 2.0, 4.0), {}, -3.0 * NOISE),
+        (Wall(), leaning(3.0 * NOISE, 2.7), {}, 3.0 * NOISE),
+        (Wall(), bulging(5.0 * NOISE, (3.0, 1.5), 1.5), {}, 5.0 * NOISE),
+        (Wall(), leaning_corner(4.0 * NOISE, 4.0, 6.0, 2.7), {}, 4.0 * NOISE),
+        (Wall(laid=0.001), still, {"5-3": 4.0 * NOISE}, 4.0 * NOISE),
+        (Wall(laid=0.001), still, {"5-3": -4.0 * NOISE}, -4.0 * NOISE),
+    ],
+    ids=["settled pier", "settled part", "rotated", "bulge", "corner", "proud", "sunk"],
+)
+def test_amounts_are_within_three_sigma_in_nearly_all_surveys(
+    wall: Wall, moved: Movement, proud: dict[str, float], amount: float
+):
+    within = 0
+    for seed in range(60):
+        found = findings(survey_of(1000 + seed, wall, moved, proud))
+        first = [*found.beds.movements, *found.face.movements, *found.face.odd][0]
+        within += abs(first.amount - amount) < 3.0 * first.sigma
+    print(f"{within} of 60")
+    assert within >= 58
 
 
 def kinds(wall: WallBeds | WallFace) -> set[str]:

@@ -455,3 +455,16 @@ def test_the_short_way_of_reading_coordinates_reads_what_the_long_one_does(tmp_p
             except SurveyError as error:
                 both.append(str(error))
         assert both[0] == both[1], word
+
+
+def test_kinds_are_words_of_five_languages(tmp_path):
+    path = tmp_path / "a.moma"
+    path.write_text(
+        "moma-survey 1\ndepth Binder 0.5 source seen\ncanon Läufer 0.6 0.3 sigma 0.03 source seen\n"
+        "stone W1 Schlussstein\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 1 0 1\nend\n",
+        encoding="utf-8",
+    )
+    survey = read_moma(path)
+    assert [rule.kind for rule in survey.head.depth_rules] == ["header"]
+    assert [canon.kind for canon in survey.head.canons] == ["stretcher"]
+    assert survey.blocks[0].kind == "keystone"
