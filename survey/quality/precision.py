@@ -52,6 +52,7 @@ class StoneQuality:
     remarks : changes that made its outline a polygon, in words
     evidence : of each point, then of each corner, how it was located on photographs; () if they were measured in space
     roughness : standard deviation of its face about a plane, with which it was fitted beside `sigma` [m]
+    astray : largest distance of a point left out from the plane, over its own standard deviation [-]; 0 without any
     """
 
     code: str
@@ -89,6 +90,7 @@ class StoneQuality:
     remarks: tuple[str, ...] = ()
     evidence: tuple[Mapping[str, object], ...] = ()
     roughness: float = 0.0
+    astray: float = math.inf
 
     @property
     def measured(self) -> bool:
@@ -190,6 +192,7 @@ def appraise(block: SurveyedBlock) -> StoneQuality:
         remarks=face.remarks,
         evidence=record.evidence,
         roughness=record.roughness,
+        astray=float(np.abs(fit.standardised[list(fit.rejected)]).max(initial=0.0)),
     )
 
 

@@ -58,6 +58,17 @@ def test_every_fault_has_its_reason(changes: dict[str, object], urgency: Urgency
             {"points": 100, "blunders": ("point",) * 20, "worn": ("corner",) * 6},
             Urgency.BLUNDERS,
         ),
+        # two of seven points by chance, 1 in 300,000 each among 21 stones, and not by chance
+        (
+            {"points": 7, "redundancy": 2, "blunders": ("point",) * 2, "astray": 4.3},
+            {"points": 7, "redundancy": 2, "blunders": ("point",) * 2, "astray": 5.2},
+            Urgency.BLUNDERS,
+        ),
+        (
+            {"points": 13, "redundancy": 7, "blunders": ("point",) * 3, "astray": 9.0},
+            {"points": 11, "redundancy": 5, "blunders": ("point",) * 3, "astray": 4.0},
+            Urgency.BLUNDERS,
+        ),
         # with a redundancy of 100 among 340 of the others: 1.27 and 1.54 times the scatter of the survey
         ({"redundancy": 100, "sigma0": 1.4}, {"redundancy": 100, "sigma0": 2.0}, Urgency.SCATTER),
         ({"sigma0": 0.4}, {"sigma0": 0.3}, Urgency.SMOOTH),

@@ -460,7 +460,7 @@ def test_the_short_way_of_reading_coordinates_reads_what_the_long_one_does(tmp_p
 def test_kinds_are_words_of_five_languages(tmp_path):
     path = tmp_path / "a.moma"
     path.write_text(
-        "moma-survey 1\ndepth Binder 0.5 source seen\ncanon Läufer 0.6 0.3 sigma 0.03 source seen\n"
+        "moma-survey 1\nsigma 0.003\ndepth Binder 0.5 source seen\ncanon Läufer 0.6 0.3 sigma 0.03 source seen\n"
         "stone W1 Schlussstein\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 1 0 1\nend\n",
         encoding="utf-8",
     )
