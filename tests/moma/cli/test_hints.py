@@ -165,3 +165,19 @@ def test_a_file_read_otherwise_takes_the_place_of_what_was_stored(tmp_path: Path
     done = invoke(*words, "--snap", "0.001")
     assert done.exit_code
     assert invoke(*words, "--snap", "0.001", *advised(done.stderr.splitlines()[-1])).exit_code == 0
+
+
+def test_a_scene_of_stones_without_courses_names_the_lowest(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/a.db"
+    words = ["--outlines", str(outlines(tmp_path / "o.json")), "--depth", "0.4"]
+    assert invoke("ingest", *words, "--db", url).exit_code == 0
+    scene = tmp_path / "a.toml"
+    stone = "[materials.stone]\ndensity = 2300\nyoung = 1e10\npoisson = 0.2\n"
+    text = f'[scene]\nname = "a"\n[select]\nkind = "ashlar"\n{stone}'
+    scene.write_text(f'{text}[bodies]\ndefault = "rigid"\nfixed = ["course = 1"]\n')
+    message = invoke("check", str(scene), "--db", url).stderr
+    lowest = re.search(r"no selected stone has a course: .* the lowest are (\[.*\])", message)
+    assert lowest is not None, message
+    assert lowest[1] == '["S0", "S1", "S2"]'
+    scene.write_text(f'{text}[bodies]\ndefault = "rigid"\nfixed = {lowest[1]}\n')
+    assert "3 fixed" in invoke("check", str(scene), "--db", url).stdout
