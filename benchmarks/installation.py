@@ -30,7 +30,7 @@ PAGE = Path("docs/design/first-use.md")
 _MEGABYTE = 1e6
 _LARGEST = 7  # packages that are listed by name
 _LONGEST = 120  # processor time after which a command of the matrix is ended [s]
-_BUILD = "import sys, wheel_with_kernels; wheel_with_kernels.build_wheel(sys.argv[1])"
+_BUILD = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", ".", "--wheel-dir")
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def main(write: bool = False, wheel: Path | None = None) -> None:
         folder, compiled = Path(name), 0.0
         if wheel is None:
             began = _processor_time()
-            subprocess.run([sys.executable, "-c", _BUILD, name], check=True, stdout=subprocess.DEVNULL)
+            subprocess.run([*_BUILD, name], check=True)
             compiled = _processor_time() - began
             (wheel,) = folder.glob("*.whl")
         packages = _installed(wheel, folder / "new")

@@ -5,9 +5,36 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-__all__ = ["StartCorners", "facing", "joint_motion", "keep_largest", "patch_pressures"]
+from mechanics.arrays import Array, Bools, Ints
+
+__all__ = ["Faces", "StartCorners", "facing", "joint_motion", "keep_largest", "patch_pressures"]
 
 _ONE_PLANE = 0.999  # cosine of the angle between two contacts of one joint [-]
+
+
+class Faces(NamedTuple):
+    """Flat faces of all stones at one instant.
+
+    Attributes
+    ----------
+    body : (nf,)
+    first : (nb+1,) faces of each body
+    normal : (nf, 3) outward [-]
+    centre : (nf, 3) mean of the corners [m]
+    corner : (nf, m, 3) counter-clockwise seen from outside [m]
+    corners : (nf,) number of those of each face
+    size : (nf,) smallest width of the body [m]
+    flat : (nf,) false for the facets of balls, which serve pictures only
+    """
+
+    body: Ints
+    first: Ints
+    normal: Array
+    centre: Array
+    corner: Array
+    corners: Ints
+    size: Array
+    flat: Bools
 
 
 class StartCorners(NamedTuple):

@@ -4,48 +4,21 @@ The joints of the start of a run keep their numbers, even after they have parted
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.arrays import Array, Bools, Ints
+from mechanics.arrays import Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.contact.detection import FLAT
 from mechanics.model.model import Model
-from mechanics.results._kernels import facing
+from mechanics.results._kernels import Faces, facing
 from mechanics.scene.state import State
 
-__all__ = ["Faces", "Interfaces", "find_interfaces", "placed_faces"]
-
+__all__ = ["Interfaces", "find_interfaces", "placed_faces"]
 
 _HINGED = float(
     np.cos(np.radians(45.0))
 )  # cosine of the angle to which a joint of the start may open on its edge
-
-
-class Faces(NamedTuple):
-    """Flat faces of all stones at one instant.
-
-    Attributes
-    ----------
-    body : (nf,)
-    first : (nb+1,) faces of each body
-    normal : (nf, 3) outward [-]
-    centre : (nf, 3) mean of the corners [m]
-    corner : (nf, m, 3) counter-clockwise seen from outside [m]
-    corners : (nf,) number of those of each face
-    size : (nf,) smallest width of the body [m]
-    flat : (nf,) false for the facets of balls, which serve pictures only
-    """
-
-    body: Ints
-    first: Ints
-    normal: Array
-    centre: Array
-    corner: Array
-    corners: Ints
-    size: Array
-    flat: Bools
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
-from mechanics.results.interfaces import Faces
+from mechanics.results._kernels import Faces
 from mechanics.stones.convex_polygons import following, moments, overlaps
 
 __all__ = ["JointPolygons", "eccentricity", "sections"]

@@ -9,9 +9,9 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
-from mechanics.results._kernels import StartCorners
+from mechanics.results._kernels import Faces, StartCorners
 from mechanics.results.contact_result import ContactResult, JointResult
-from mechanics.results.interfaces import Faces, find_interfaces, placed_faces
+from mechanics.results.interfaces import find_interfaces, placed_faces
 from mechanics.results.joint_sections import JointPolygons, eccentricity, sections
 from mechanics.results.patch_pressure import patch_pressure
 from mechanics.scene.state import State

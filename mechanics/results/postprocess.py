@@ -12,8 +12,9 @@ from mechanics.contact.contacts import Contacts, material_points
 from mechanics.dynamics.step import Step
 from mechanics.model.deformable import Deformable
 from mechanics.model.model import Model
+from mechanics.results._kernels import Faces
 from mechanics.results.contact_result import ContactResult, JointResult
-from mechanics.results.interfaces import Faces, Interfaces, find_interfaces, placed_faces
+from mechanics.results.interfaces import Interfaces, find_interfaces, placed_faces
 from mechanics.results.joints import StartingJoints, joint_results, parting, starting_joints
 from mechanics.results.result import BodyResult, Frame
 from mechanics.results.stress_values import stress_values

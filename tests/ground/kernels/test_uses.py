@@ -1,6 +1,8 @@
 """The lists of kernels that a first use compiles, against the kernels themselves."""
 
 import inspect
+import subprocess
+import sys
 from collections import Counter
 from importlib import import_module
 
@@ -10,6 +12,7 @@ import pytest
 from numba import njit
 
 from ground.kernels.uses import COMMANDS, OTHERS, _decoded, _encoded, kernels_of, recording
+from tests.paths import ROOT
 
 USES = {
     f"{command}-{use.name}-{at}": use
@@ -27,6 +30,25 @@ def test_a_listed_kernel_exists_and_takes_the_listed_arguments(use):
         assert _encoded(kind) == given
         if isinstance(kind, numba.types.BaseNamedTuple):
             assert len(kind.instance_class._fields) == len(kind.types)
+
+
+def test_kernels_need_nothing_but_numba_and_scipy():
+    """Wheels are built, and kernels compiled beside an installation, where no other package is there yet."""
+    program = """
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("skfem", "meshio", "trimesh", "gmsh", "pyvista", "sqlalchemy", "shapely", "typer"):
+            raise ModuleNotFoundError(name)
+sys.meta_path.insert(0, Absent())
+from ground.kernels.uses import all_kernels, _decoded
+from importlib import import_module
+for use in all_kernels():
+    import_module(use.module)
+    for given in use.types:
+        _decoded(given)
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)
 
 
 def test_the_sample_compiles_each_kernel_for_one_kind_of_arguments():

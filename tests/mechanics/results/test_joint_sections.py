@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.results.interfaces import Faces
+from mechanics.results._kernels import Faces
 from mechanics.results.joint_sections import eccentricity, sections
 
 TURN = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
