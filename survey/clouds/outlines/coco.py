@@ -68,7 +68,11 @@ def read_coco(
             f"masks of {len(shown)} pictures: {names}", where=str(path), remedy="give a file for each picture"
         )
     image = images.get(next(iter(shown), None), {})
-    size = (int(image["width"]), int(image["height"])) if {"width", "height"} <= set(image) else None
+    size = (
+        (int(image["width"]), int(image["height"]))
+        if {"width", "height"} <= set(image)
+        else _size(annotations)
+    )
     kinds = {category.get("id"): str(category.get("name")) for category in head.get("categories", [])}
     names = [_category(annotation, kinds) for annotation in annotations]
     stones = class_of_stones(path, Counter(name for name in names if name), category, "categories")
@@ -77,6 +81,18 @@ def read_coco(
     name = Path(str(image.get("file_name", path.name))).name
     places = world_of(path.with_name(name)) or world_of(path)
     return outlines, places, size
+
+
+def _size(annotations: list[Any]) -> tuple[int, int] | None:
+    """Return the columns and rows of the picture that run lengths state; None if none do, or they differ."""
+    masks = (annotation.get("segmentation") for annotation in annotations)
+    sizes = {
+        tuple(mask["size"]) for mask in masks if isinstance(mask, dict) and len(mask.get("size", ())) == 2
+    }
+    if len(sizes) != 1:
+        return None
+    rows, columns = sizes.pop()
+    return int(columns), int(rows)
 
 
 def _category(annotation: Mapping[str, Any], names: Mapping[Any, str]) -> str:

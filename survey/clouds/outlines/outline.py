@@ -53,6 +53,7 @@ _SPELLED = {
     meaning: tuple(dict.fromkeys(spelling for name in (meaning, *names) for spelling in spellings(name)))
     for meaning, names in FIELDS.items()
 }
+_CUT = 10  # characters of a name in a shapefile (dBASE)
 _PLACES = frozenset(("layer", "lage", "row", "reihe", "rang", "lit", "fila"))
 """Names that mean other things than courses, too: the layer of a drawing, a place."""
 
@@ -227,6 +228,7 @@ def columns_of(names: Sequence[str], chosen: Mapping[str, str], where: str) -> d
     for name in names:
         for spelling in (plain(name), plain(unit_of(name)[0])):
             spelled.setdefault(spelling, name)
+    cut = {plain(name): name for name in names if len(name) == len(plain(name)) == _CUT}
     out = {}
     for meaning, words in _SPELLED.items():
         if meaning in chosen:
@@ -238,8 +240,9 @@ def columns_of(names: Sequence[str], chosen: Mapping[str, str], where: str) -> d
             out[meaning] = chosen[meaning]
             continue
         for spelling in words:
-            if spelling in spelled and spelled[spelling] not in (*out.values(), *chosen.values()):
-                out[meaning] = spelled[spelling]
+            name = spelled.get(spelling) or cut.get(spelling[:_CUT])
+            if name is not None and name not in (*out.values(), *chosen.values()):
+                out[meaning] = name
                 break
     return out
 

@@ -149,6 +149,9 @@ def _read(
         sound = tuple(feature for feature in features if isinstance(feature, Outline))
         wrong = tuple(feature for feature in features if isinstance(feature, WrongOutline))
         return _scaled(Drawing(path, sound, wrong=wrong), unit)
+    if ending in (".jpg", ".jpeg"):
+        what, remedy = "JPEG smears the edges of stones", "export the picture of stones as PNG or TIFF"
+        raise UsageError(what, where=str(path), remedy=remedy)
     known = ", ".join((*_VECTORS, ".dxf", *_TABLES, *PICTURES))
     raise UsageError(
         f"unknown ending {ending!r}",

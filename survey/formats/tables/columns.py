@@ -27,7 +27,16 @@ ALIASES: Mapping[str, Sequence[str]] = {
     # English; German; French; Italian; Spanish
     "block": (
         *("block", "stone", "block id", "stone id", "stone no", "stone number", "stone code", "block code"),
-        *("Stein", "Steinnummer", "Stein Nr", "Quader", "Stein ID", "Steincode", "Steinbezeichnung"),
+        *(
+            "Stein",
+            "Steinnummer",
+            "Stein Nr",
+            "Quader",
+            "Stein ID",
+            "Steincode",
+            "Steinbezeichnung",
+            "Stein Bez",
+        ),
         *("pierre", "bloc", "numéro de pierre", "n° pierre", "id pierre", "code pierre"),
         *("pietra", "blocco", "concio", "sasso", "numero pietra", "n pietra", "id pietra"),
         *("piedra", "bloque", "sillar", "dovela", "número de piedra", "n piedra", "id piedra"),

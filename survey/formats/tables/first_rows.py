@@ -14,7 +14,7 @@ from survey.formats.tables.code_template import ROLES, CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, kind_of_column
 from survey.formats.tables.point_table import TableStone
 
-__all__ = ["check_stones_repeat", "note_key", "with_role", "with_units"]
+__all__ = ["check_names", "check_stones_repeat", "note_key", "with_role", "with_units"]
 
 AnyRows = TextRows | ListRows
 
@@ -119,6 +119,35 @@ def check_stones_repeat(
     what = shown(names[at]) if at < len(names) else str(at + 1)
     raise SurveyError(f"each of {len(sound)} rows is a stone of its own: column {what} numbers the points",
                       where=path, remedy=remedy)  # fmt: skip
+
+
+def check_names(path: str, title: str, stones: Mapping[str, TableStone]) -> None:
+    """Refuse codes that were taken for names: a column of descriptions that holds stones and the roles of points.
+
+    Parameters
+    ----------
+    path : of the table, for errors
+    title : of the column that names the stones
+    stones : that were read
+
+    Raises
+    ------
+    SurveyError
+        with the template that reads them
+    """
+    names = [stone.name for stone in stones.values() if stone.name]
+    if len(names) < _FEWEST:
+        return
+    advice = _ADVISED.search(CodeTemplate(_NO_CODE).expected(names[0], names[1:]))
+    if advice is None or "{role}" not in advice[0]:
+        return
+    template = CodeTemplate(advice[0].removeprefix('--codes "').removesuffix('"'))
+    roles: dict[str, set[str]] = {}
+    for fields in filter(None, map(template.parse, names)):
+        roles.setdefault(fields.block, set()).add(fields.role)
+    if any({"vertex", "point"} <= one for one in roles.values()):
+        what = f"column {shown(title)} holds codes of stones and roles, such as {shown(names[0])}"
+        raise SurveyError(what, where=path, remedy=f"give {advice[0]}")
 
 
 def note_key(name: str) -> str:

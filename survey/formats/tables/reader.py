@@ -42,7 +42,7 @@ from survey.formats.tables.code_template import (
     role_of,
 )
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map
-from survey.formats.tables.first_rows import check_stones_repeat, note_key, with_role, with_units
+from survey.formats.tables.first_rows import check_names, check_stones_repeat, note_key, with_role, with_units
 from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
 from survey.formats.tables.wkt import outline_of
@@ -179,7 +179,7 @@ def _opened_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream
         del ahead[:]
     columns = Columns(5, {name: k for k, name in enumerate(_LIST[form])})
     if ahead[header:]:
-        rows.delimiter = _list_delimiter(rows, ahead[header:])
+        rows.delimiter = _list_delimiter(rows, ahead[header:], form)
         header += _further_titles(rows, ahead[header:])
         if header:
             _check_axes(rows, ahead[header - 1], form)
@@ -225,6 +225,10 @@ def _read(
     if not form and "block" in columns.at and "outline" not in columns.at:
         names = rows.cells(titles[-1][1], titles[-1][0]) if titles else ()
         check_stones_repeat(rows.path, columns, names, collector.table.stones, options.columns)
+        at = columns.at["block"]
+        title = names[at] if at < len(names) else str(at + 1)
+        if "description" in (kind_of_column(title), *read_map(options.columns).names):
+            check_names(rows.path, title, collector.table.stones)
     head = collector.head
     doubt = _order_remarks(rows, collector, columns, options, form, titles)
     remarks = (*rows.remarks, *reader.remarks, *collector.remarks, *doubt)
@@ -290,7 +294,7 @@ def _is_data(rows: AnyRows, names: Sequence[str], columns: Columns, number: int)
     return True
 
 
-def _list_delimiter(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> str:
+def _list_delimiter(rows: AnyRows, ahead: Sequence[tuple[int, Any]], form: str) -> str:
     """Return the separator of the fields in the first line that has coordinates."""
     stated = rows.delimiter
     for number, row in ahead:
@@ -301,11 +305,15 @@ def _list_delimiter(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> str:
     rows.delimiter = stated
     number, row = ahead[0]
     text = row if isinstance(row, str) else " ".join(row)
+    words = text.split()
+    axes = "x=3,y=4" if form == "penzd" else "y=3,x=4"
+    coded = len(words) == 5 and all(map(is_number, words[2:])) and not is_number(words[1])
+    example = f"name=1,description=2,{axes},z=5" if coded else "block=1,x=2,y=3,z=4"
     raise rows.fail(
         number,
         f"{shown(text)} is not a point with two coordinates, an elevation and a description",
         "separate the fields by commas, semicolons, tabs or blanks; for other columns give "
-        '--format csv --columns "block=1,x=2,y=3,z=4"',
+        f'--format csv --columns "{example}"',
     )
 
 

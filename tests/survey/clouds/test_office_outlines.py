@@ -19,6 +19,12 @@ from tests.survey.formats.workbooks import xlsx
         ({"fid": 7, "Steinnummer": "B 2", "Schicht": 2, "Tiefe (mm)": "380"}, "B 2", 2, 0.38),
         ({"fid": 7, "numéro de pierre": "P3", "profondeur [cm]": "38,0"}, "P3", None, 0.38),
         ({"id": 7, "depth": 0.38}, "7", None, 0.38),
+        (
+            {"id": 7, "Steinnumme": "05-03", "Steinlage": 5.0, "Profondeur": "0,38"},
+            "05-03",
+            5,
+            0.38,
+        ),  # of a shapefile
         ({"EntityHandle": "3A", "Text": "05-03", "Layer": "STEINE"}, "05-03", None, None),
     ],
 )
@@ -116,6 +122,19 @@ def test_categories_that_are_kinds_are_kinds(tmp_path):
     assert [one.said.kind for one in found] == ["stretcher"] * 5 + ["header"]
     found = read_outlines(coco(tmp_path / "b.json", ["stone"])).outlines
     assert [one.said.kind for one in found] == [None] * 6
+
+
+def test_run_lengths_state_the_size_of_the_picture_and_jpeg_is_named(tmp_path):
+    mask = np.zeros((120, 300), int)
+    mask[20:80, 40:140] = 1
+    flat = mask.T.ravel()
+    counts = np.diff(np.concatenate([[0], np.flatnonzero(np.diff(flat)) + 1, [len(flat)]])).tolist()
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps([{"image_id": 1, "segmentation": {"size": [120, 300], "counts": counts}}]))
+    assert read_outlines(path).size == (300, 120)
+    (tmp_path / "a.jpg").write_bytes(b"")
+    with pytest.raises(UsageError, match="JPEG smears the edges of stones; export"):
+        read_outlines(tmp_path / "a.jpg")
 
 
 def corners(names, scale=1.0, third=False):

@@ -107,6 +107,41 @@ def test_numbers_of_points_beside_a_column_that_repeats(tmp_path):
     assert read(path, columns="block=Objekt").keys() == FACES.keys()
 
 
+@pytest.mark.parametrize(("title", "mark"), [("Code", " "), ("Beschreibung", "_"), ("desc", ":")])
+def test_codes_in_a_column_of_codes_are_no_names(tmp_path, title, mark):
+    cells = [
+        [str(k), *map(str, place), f"{code}{mark}{role}"] for k, (code, role, *place) in enumerate(POINTS, 1)
+    ]
+    path = table(tmp_path / "a.csv", ["Point", "East", "North", "Elev", title], cells)
+    with pytest.raises(SurveyError, match=f"column '{title}' holds codes of stones and roles") as refused:
+        read(path)
+    (codes,) = re.findall(r'--codes "([^"]*)"', str(refused.value))
+    assert {code: face[:2] for code, face in read(path, codes=codes).items()} == FACES
+    # names that end in letters of their own are names
+    named = [
+        [*row[:-1], f"{code} E"] for row, (code, role, *_) in zip(cells, POINTS, strict=True) if role == "E"
+    ]
+    assert len(read(table(tmp_path / "b.csv", ["Point", "East", "North", "Elev", title], named))) == len(
+        FACES
+    )
+
+
+def test_a_list_whose_code_comes_second_is_read_as_the_message_says(tmp_path):
+    lines = [
+        f"{k:>8} {code + '_' + role:>12} {x:14.4f}{y:14.4f}{z:10.4f}"
+        for k, (code, role, x, y, z) in enumerate(POINTS, 1)
+    ]
+    path = tmp_path / "leica.txt"
+    path.write_text("\n".join(lines))
+    with pytest.raises(SurveyError) as refused:
+        open_penzd(path)
+    columns = re.findall(r'--columns "([^"]*)"', str(refused.value))[0]
+    with pytest.raises(SurveyError) as refused:
+        read(path, columns=columns)
+    codes = re.findall(r'--codes "([^"]*)"', str(refused.value))[0]
+    assert {code: face[:2] for code, face in read(path, columns=columns, codes=codes).items()} == FACES
+
+
 def test_titles_with_digits_before_a_list_and_roles_that_follow_names(tmp_path):
     lines = ["Projekt: Nordwand 2024", "System: ETRS89/UTM32", "", "Punktnr.  Ostwert  Nordwert  Höhe  Code"]
     lines += [
