@@ -187,7 +187,7 @@ def main() -> None:
     options = options_of("outlines", __doc__)
     options.add_argument("--walls", type=int, default=3, help="draws of each kind of rendered wall")
     options.add_argument(
-        "--first", type=int, default=100, help="seed of the first; weights were fitted to 0 to 6"
+        "--first", type=int, default=100, help="seed of the first; weights were fitted to 0 to 2"
     )
     options.add_argument(
         "--photographs", type=Path, default=_SHARED / "segmentation", help="folder with boxes.json"

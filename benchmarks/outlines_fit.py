@@ -27,8 +27,8 @@ Samples = list[tuple[Array, bool]]
 
 
 def fitted(draws: int) -> Iterator[tuple[str, Array]]:
-    """Yield names and weights: of borders in courses and in rubble, and of missing joints."""
-    walls = [one for seed in range(draws) for one in _walls(seed)]
+    """Yield names and weights: of borders in courses and in rubble, and of missing joints; walls clean and weathered."""
+    walls = [one for seed in range(draws) for weathered in (False, True) for one in _walls(seed, weathered)]
     for kind in ("coursed", "rubble"):
         own = [(fields, true) for style, fields, true in walls if (style == "rubble") == (kind == "rubble")]
         weights: Array | None = None
@@ -44,10 +44,10 @@ def fitted(draws: int) -> Iterator[tuple[str, Array]]:
             yield "missing", _regression(missing)
 
 
-def _walls(seed: int) -> Iterator[tuple[str, Fields, Ints]]:
+def _walls(seed: int, weathered: bool) -> Iterator[tuple[str, Fields, Ints]]:
     for style in STYLES:
         progress(f"{style} {seed}")
-        wall = render_wall(style, seed)
+        wall = render_wall(style, seed, weathered=weathered)
         places = PixelPlace(np.eye(2), np.zeros(2))
         photograph = Photograph(Path("wall.png"), wall.picture, None, None, places, True)
         width, _ = joint_width(wall.picture)
@@ -61,17 +61,15 @@ def _collect(
     fields: Fields, true: Ints, kind: str, weights: Array | None, borders: Samples, missing: Samples
 ) -> None:
     """Add the borders of a wall before and after regions are joined, and the lines across regions."""
-    regions = closed_regions(fields.strength.evidence, fields.typical, fields.void)
-    bond = bond_of(regions, fields.strength, fields.typical, fields.colours, kind)
+    regions = closed_regions(fields.parting, fields.void)
+    bond = bond_of(regions, fields.strength, fields.colours, kind)
     if weights is not None:
         bond.weights = weights
     borders += _samples(bond, regions, true)
     join_weak(bond)
     regions = renumbered(regions, bond)
     borders += _samples(bond, regions, true)
-    for box, axis, whole, after, line in lines_across(
-        regions, fields.strength, fields.typical, fields.hidden
-    ):
+    for box, axis, whole, after, line in lines_across(regions, fields.strength, fields.hidden):
         there = true[box] if axis else true[box].T
         first, second = (_main(there, part) for part in (whole & ~after, after))
         if first and second:

@@ -1,6 +1,6 @@
 """Walls rendered as photographs, with the outline of every stone: ashlar, coursed, an arch over a door, rubble.
 
-Everything is synthetic. Grain and pores of the stone, stains, sun and shade, repairs let into stones,
+Everything is synthetic. Grain, pores and weathering of the stone, stains, sun and shade, repairs let into stones,
 vegetation, and joints that are flush or recessed are there because real photographs have them.
 """
 
@@ -23,6 +23,8 @@ STYLES = ("ashlar", "coursed", "arch", "rubble")
 
 _FINER = 3  # pixels along the side of one, of the drawing before it is averaged
 _QUARRIES = (2.0, 9.0)  # scatter of the colours of stones, from one bed of one quarry to many [of 255]
+_PATCHES = (0.01, 0.03)  # sizes of weathered patches of a stone [m]
+_WEATHERED = (2.0, 5.0)  # scatter of their colours [of 255]
 _REPAIRED = 0.05  # part of the stones of ashlar that have a repair let in
 _DOOR = (0.55, 1.25, 0.34, 11)  # half width, springing and thickness of its arch [m], number of voussoirs
 
@@ -67,7 +69,9 @@ class RenderedWall:
     opening: Array | None
 
 
-def render_wall(style: str, seed: int, pixel: float = 0.002, clutter: bool = True) -> RenderedWall:
+def render_wall(
+    style: str, seed: int, pixel: float = 0.002, clutter: bool = True, weathered: bool = False
+) -> RenderedWall:
     """Render a wall; the same style and seed always give the same one.
 
     Parameters
@@ -76,6 +80,7 @@ def render_wall(style: str, seed: int, pixel: float = 0.002, clutter: bool = Tru
     seed : of the random numbers
     pixel : side of a pixel [m]
     clutter : whether stains, shade, repairs and vegetation are there
+    weathered : whether damp and lichen have left patches of colour on the stones
     """
     chance = np.random.default_rng([STYLES.index(style), seed])
     opening: Array | None = None
@@ -95,6 +100,8 @@ def render_wall(style: str, seed: int, pixel: float = 0.002, clutter: bool = Tru
     fine = rasterised(outlines, (shape_px[0] * _FINER, shape_px[1] * _FINER), pixel / _FINER)
     void = np.zeros_like(fine) if opening is None else rasterised([opening], fine.shape, pixel / _FINER)
     picture, depth = _painted(fine, void > 0, pixel, clutter, chance)
+    if weathered:
+        picture = _with_patches(picture, depth, pixel, np.random.default_rng([STYLES.index(style), seed, 2]))
     return RenderedWall(picture, depth, pixel, tuple(outlines), tuple(kinds), opening)
 
 
@@ -267,6 +274,19 @@ def _painted(
     colour = gaussian_filter(colour, (0.7, 0.7, 0.0)) + chance.normal(0.0, 2.0, colour.shape)
     depth[open_ > 0.5] = np.nan
     return np.clip(np.round(colour), 0.0, 255.0).astype(np.uint8), depth.astype(np.float32)
+
+
+def _with_patches(
+    picture: NDArray[np.uint8], depth: NDArray[np.float32], pixel: float, chance: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Return a picture with patches of colour wherever there is wall."""
+    from scipy.ndimage import gaussian_filter
+
+    out = picture.astype(np.float64)
+    for size in _PATCHES:
+        noise = gaussian_filter(chance.normal(size=picture.shape), (size / pixel, size / pixel, 0.0))
+        out += chance.uniform(*_WEATHERED) * _unit(noise) * np.isfinite(depth)[..., None]
+    return np.clip(np.round(out), 0.0, 255.0).astype(np.uint8)
 
 
 def _unit(noise: Array) -> Array:

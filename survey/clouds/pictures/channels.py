@@ -5,11 +5,12 @@ from numpy.typing import NDArray
 
 from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools
-from survey.clouds.pictures.joints import WIDTH, Field
+from survey.clouds.pictures.joints import ROUNDED, WIDTH, Field
 
-__all__ = ["channels_of", "covered", "grains", "lightness", "openings"]
+__all__ = ["channels_of", "covered", "grains", "lightness", "openings", "without_shade"]
 
 _DARK = 0.40  # lightness over that of the wall below which it is an opening: the darkest shade leaves more than half
+_BLACK = 16.0  # L* + 16 is in proportion to the cube root of the luminance (CIE 1976)
 _BEHIND = 0.12  # distance of an opening behind the faces [m], more than joints are deep
 _BEFORE = (
     0.035  # distance before the faces of what is no stone [m], more than bosses of plain ashlar stand out
@@ -52,6 +53,18 @@ def lightness(pixels: NDArray[np.uint8]) -> tuple[Field, Field, Field]:
     return light.astype(np.float32), green.astype(np.float32), blue.astype(np.float32)
 
 
+def without_shade(channels: list[Field]) -> list[Field]:
+    """Return channels whose first three are the logarithm of L*, and a* and b* over it, all in units of L*.
+
+    A shade divides the light by a factor. It lessens the contrast of L*, a* and b* within it; of these it changes
+    the first by a constant, and the others not at all.
+    """
+    light, green, blue, *others = channels
+    root = light + np.float32(_BLACK)
+    usual = np.float32(np.median(root))
+    return [usual * np.log(root / usual), green * usual / root, blue * usual / root, *others]
+
+
 def grains(channels: list[Field]) -> NDArray[np.float32]:
     """Return smoothed channels (c, h, w), each over the usual difference between places two joints apart."""
     from scipy.ndimage import uniform_filter
@@ -59,7 +72,8 @@ def grains(channels: list[Field]) -> NDArray[np.float32]:
     out = np.stack([uniform_filter(channel, round(WIDTH)) for channel in channels])
     apart = 2 * round(WIDTH)
     usual = CONSISTENT * np.median(np.abs(out[:, :, apart:] - out[:, :, :-apart]), axis=(1, 2))
-    return (out / np.where(usual > 0.0, usual, 1.0)[:, None, None]).astype(np.float32)
+    least = ROUNDED / round(WIDTH)  # of the mean of its pixels
+    return (out / np.maximum(usual, least)[:, None, None]).astype(np.float32)
 
 
 def _relief(depth: Field) -> Field:
@@ -88,7 +102,7 @@ def openings(light: Field, depth: Field | None) -> Bools:
     light : (h, w) L*
     depth : (h, w) distance before the plane of the wall [m], NaN where nothing is known; None without a scan
     """
-    from scipy.ndimage import binary_opening, gaussian_filter, uniform_filter
+    from scipy.ndimage import gaussian_filter, uniform_filter
 
     found = gaussian_filter(light, 0.5 * WIDTH) < _DARK * float(np.quantile(light, 0.75))
     if depth is not None and np.isfinite(depth).any():
@@ -98,9 +112,18 @@ def openings(light: Field, depth: Field | None) -> Bools:
     # single points in an opening, and dark pores, are neither
     found = uniform_filter(found.astype(np.float32), 7) > 0.5
     size = round(_LEAST * WIDTH)
-    # a square, separable and so as quick as two lines
-    eroded: Bools = binary_opening(found, np.ones((1, size), dtype=bool))
-    return np.asarray(binary_opening(eroded, np.ones((size, 1), dtype=bool)), dtype=np.bool_)
+    return _runs(_runs(found, size).T, size).T
+
+
+def _runs(where: Bools, least: int) -> Bools:
+    """Return which pixels (h, w) are in a run along their row of at least so many that are chosen."""
+    change = np.diff(np.pad(where, ((0, 0), (1, 1))).ravel().astype(np.int8), append=0)
+    first, beyond = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+    long = beyond - first >= least
+    steps = np.zeros(change.shape, dtype=np.int8)
+    steps[first[long]], steps[beyond[long]] = 1, -1
+    out: Bools = np.cumsum(steps, dtype=np.int8).reshape(len(where), -1)[:, :-2] > 0
+    return out
 
 
 def covered(green: Field, depth: Field | None) -> Bools:
@@ -114,8 +137,10 @@ def covered(green: Field, depth: Field | None) -> Bools:
     from scipy.ndimage import binary_closing, binary_opening, uniform_filter
 
     leaves = green < float(np.median(green)) - _GREEN
-    found = binary_opening(leaves, np.ones((3, 3), dtype=bool))
+    found = binary_opening(leaves, np.ones((3, 3), dtype=bool)) if leaves.any() else leaves
     if depth is not None and np.isfinite(depth).any():
         before = np.nan_to_num(depth, nan=0.0) > float(np.nanmedian(depth)) + _BEFORE
         found |= uniform_filter(before.astype(np.float32), 5) > 0.3
+    if not found.any():
+        return found
     return np.asarray(binary_closing(found, np.ones((5, 5), dtype=bool)), dtype=np.bool_)

@@ -17,22 +17,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "ROUNDED",
     "WIDTH",
     "Field",
     "Strength",
     "combined",
     "grain_and_contrast",
     "line_strength",
+    "step_evidence",
 ]
 
 WIDTH = 3.0
 """Width of a joint at the resolution of the work [px]."""
 
+ROUNDED = 0.3
+"""Noise that rounding to 8 bits leaves in a channel [units of L*, and of depth over its noise]."""
+
 Field = NDArray[np.float32]
 
 _DIRECTIONS = 16  # over half a turn: 11° apart, so that a line of 8 pixels leaves its pixels by less than one
 _SHORT, _LONG = 3, 5  # doublings of the lines: 8 and 32 pixels
-_ROUNDED = 0.3  # noise that rounding to 8 bits leaves in a channel [units of L*, and of depth over its noise]
+_NO_STEP, _STEP = 2.0, 5.0  # steps of colour that texture makes, and that two stones make [grains]
+_SUREST_STEP = (
+    0.5  # evidence of a step at most, over that of a usual joint: both edges of mortar are steps too
+)
+_SPARSE = 4  # pixels from one line whose contrast is counted to the next
 _REACHES = (
     3,
     5,
@@ -46,14 +55,12 @@ class Strength:
     Attributes
     ----------
     evidence : (h, w) geometric mean of the contrasts along a short and a long line
-    short : (h, w) contrast along a short line
-    upright : (h, w) the same, of lines within 25° of the vertical alone
+    upright : (h, w) contrast along a short line, of lines within 25° of the vertical alone
     level : (h, w) of lines within 25° of the horizontal alone
     angle : (h, w) direction of the line, from the horizontal [rad]
     """
 
     evidence: Field
-    short: Field
     upright: Field
     level: Field
     angle: Field
@@ -92,10 +99,11 @@ def grain_and_contrast(channel: Field) -> tuple[float, float]:
     grain = float(steps[steps <= np.quantile(steps, 0.9)].mean())
     contrast = 0.0
     for turned in (smooth, smooth.T):
-        line = _means(np.ascontiguousarray(turned), 0.0, _LONG)
+        # along a line of 32 pixels, the mean of the next few is about the same
+        line = np.ascontiguousarray(_means(np.ascontiguousarray(turned), 0.0, _LONG)[:, ::_SPARSE])
         for sign in (1.0, -1.0):
             contrast += sign * float(np.quantile(_exceeds(sign * line, 0.0, _REACHES[0]), 0.98))
-    return 1.25 * grain + _ROUNDED, contrast
+    return 1.25 * grain + ROUNDED, contrast
 
 
 def line_strength(image: Field) -> Strength:
@@ -106,13 +114,11 @@ def line_strength(image: Field) -> Strength:
     image : (h, w) at a resolution at which joints are `WIDTH` pixels wide
     """
     best = np.zeros_like(image)
-    short_best, angle, level, upright = (np.zeros_like(image) for _ in range(4))
+    angle, level, upright = (np.zeros_like(image) for _ in range(3))
     for step in range(_DIRECTIONS):
         turn = np.pi * step / _DIRECTIONS
-        steep = np.pi / 4 < turn < 3 * np.pi / 4
+        steep, slope = _slope(turn)
         turned = np.ascontiguousarray(image.T) if steep else image
-        slope = 1.0 / np.tan(turn) if steep else np.tan(turn)
-        # rows grow downwards: a line that rises to the right climbs to smaller rows
         line = _means(turned, -slope, _SHORT)
         contrast = np.maximum.reduce([_exceeds(line, -slope, reach) for reach in _REACHES])
         long = _means(contrast, -slope, _LONG)
@@ -122,12 +128,46 @@ def line_strength(image: Field) -> Strength:
         better = evidence > best
         best = np.where(better, evidence, best)
         angle[better] = turn
-        np.maximum(short_best, contrast, out=short_best)
         if min(turn, np.pi - turn) < np.radians(25.0):
             np.maximum(level, contrast, out=level)
         elif abs(turn - 0.5 * np.pi) < np.radians(25.0):
             np.maximum(upright, contrast, out=upright)
-    return Strength(best, short_best, upright, level, angle)
+    return Strength(best, upright, level, angle)
+
+
+def step_evidence(colours: NDArray[np.float32]) -> Field:
+    """Return the evidence of a joint, 1 at a usual one, where colours differ on both sides of a straight line.
+
+    Parameters
+    ----------
+    colours : (c, h, w) each over its grain, at the resolution of `line_strength`
+
+    Returns
+    -------
+    (h, w) in proportion to the geometric mean of the steps across a short and a long line, beyond those of texture
+    """
+    best = np.zeros_like(colours[0])
+    for step in range(0, _DIRECTIONS, 2):  # a step is wider than a line, and so less of a direction
+        steep, slope = _slope(np.pi * step / _DIRECTIONS)
+        short, long = (np.zeros_like(best.T if steep else best) for _ in range(2))
+        for colour in colours:
+            line = _means(np.ascontiguousarray(colour.T) if steep else colour, -slope, _SHORT)
+            after, before = _sides(line, -slope, _REACHES[0])
+            short += (after - before) ** 2
+            long += _means(after - before, -slope, _LONG) ** 2
+        found = (short * long) ** np.float32(0.25)
+        np.maximum(best, found.T if steep else found, out=best)
+    share = np.clip((best - _NO_STEP) / (_STEP - _NO_STEP), 0.0, 1.0)
+    return (_SUREST_STEP * share).astype(np.float32)
+
+
+def _slope(turn: float) -> tuple[bool, float]:
+    """Return whether a line is nearer to the vertical, and its slope from the nearer axis.
+
+    Rows grow downwards: a line that rises to the right climbs to smaller rows.
+    """
+    steep = np.pi / 4 < turn < 3 * np.pi / 4
+    return steep, float(1.0 / np.tan(turn) if steep else np.tan(turn))
 
 
 def _means(image: Field, slope: float, doublings: int) -> Field:
@@ -159,7 +199,11 @@ def _shifted(image: Field, rows: int, columns: int) -> Field:
 
 def _exceeds(line: Field, slope: float, reach: int) -> Field:
     """Return by how much each line exceeds both of those beside it at a distance, the lesser; 0 below."""
+    return np.maximum(line - np.maximum(*_sides(line, slope, reach)), 0.0)
+
+
+def _sides(line: Field, slope: float, reach: int) -> tuple[Field, Field]:
+    """Return the lines at a distance on both sides of each."""
     length = float(np.hypot(1.0, slope))
     rows, columns = round(reach / length), round(-reach * slope / length)
-    sides = np.maximum(_shifted(line, rows, columns), _shifted(line, -rows, -columns))
-    return np.maximum(line - sides, 0.0)
+    return _shifted(line, rows, columns), _shifted(line, -rows, -columns)

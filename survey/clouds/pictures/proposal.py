@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import bond_of, join_weak, renumbered
-from survey.clouds.pictures.channels import channels_of, grains
-from survey.clouds.pictures.joints import WIDTH, Field, Strength, combined, line_strength
+from survey.clouds.pictures.channels import channels_of, grains, without_shade
+from survey.clouds.pictures.joints import WIDTH, Field, Strength, combined, line_strength, step_evidence
 from survey.clouds.pictures.masonry import Named, name_stones
 from survey.clouds.pictures.photograph import Photograph
-from survey.clouds.pictures.regions import closed_regions, typical_strength
+from survey.clouds.pictures.regions import closed_regions, over_texture
 from survey.clouds.pictures.scale import joint_width, resized, resized_field
 from survey.clouds.pictures.settings import OutlineSettings
 from survey.clouds.pictures.shapes import outline_shapes, without_mortar
@@ -35,6 +35,7 @@ _HIDDEN = 0.6  # part of a stone that something covers from which it is not prop
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
 _COURSED = 0.86  # part of the strong joints that are level or upright, from which there are courses
 # (rendered rubble has 0.71 to 0.82, a wall with an arch 0.93)
+_CHROMA = slice(1, 3)  # channels of a* and b*: those of lightness step at every edge of a shade
 _OPEN = 6.0  # size of an opening over the width of a joint
 
 
@@ -240,15 +241,15 @@ class Fields:
     Attributes
     ----------
     image : (h, w) in which joints are high
-    strength : of joints
-    typical : strength of a usual joint
+    strength : of joints, 1 at a usual one
+    parting : (h, w) evidence of a joint, or of a step of colour where that is stronger
     hidden, void : (h, w) where something stands before the wall, and where there is none
     colours : (c, h, w) of the stones, each over its grain
     """
 
     image: Field
     strength: Strength
-    typical: float
+    parting: Field
     hidden: Bools
     void: Bools
     colours: NDArray[np.float32]
@@ -262,15 +263,17 @@ def measured_fields(photograph: Photograph, part: tuple[slice, slice], factor: f
     if photograph.left_out is not None:
         left_out = resized_field(photograph.left_out[part].astype(np.float32), factor) > 0.5
     channels, hidden, void = channels_of(pixels, depth, left_out)
+    channels = without_shade(channels)
     image = combined(channels)
-    strength = line_strength(image)
-    return Fields(image, strength, typical_strength(strength), hidden, void, grains(channels))
+    strength, colours = over_texture(line_strength(image)), grains(channels)
+    parting = np.maximum(strength.evidence, step_evidence(colours[_CHROMA]))
+    return Fields(image, strength, parting, hidden, void, colours)
 
 
 def joined_regions(fields: Fields, kind: str) -> Ints:
     """Return the regions (h, w) of a part of a picture, those that are one stone joined."""
-    regions = closed_regions(fields.strength.evidence, fields.typical, fields.void)
-    bond = bond_of(regions, fields.strength, fields.typical, fields.colours, kind)
+    regions = closed_regions(fields.parting, fields.void)
+    bond = bond_of(regions, fields.strength, fields.colours, kind)
     join_weak(bond)
     return renumbered(regions, bond)
 
@@ -280,10 +283,10 @@ def _tile(
 ) -> tuple[str, list[_Found], list[Array]]:
     fields = measured_fields(photograph, part, factor)
     if kind == "auto":
-        kind = _kind_of(fields.strength, fields.typical)
+        kind = _kind_of(fields.strength)
     regions = joined_regions(fields, kind)
     if kind == "coursed":
-        regions = propose_missing(regions, fields.strength, fields.typical, fields.hidden)
+        regions = propose_missing(regions, fields.strength, fields.hidden)
     found = _stones_of(regions, fields, kind)
     corner = np.array([part[1].start, part[0].start], dtype=np.float64)
     size = np.array([part[1].stop - part[1].start, part[0].stop - part[0].start])
@@ -291,9 +294,9 @@ def _tile(
     return kind, [_moved(one, corner, scale, factor) for one in found], _boxes(fields.void, corner, scale)
 
 
-def _kind_of(strength: Strength, typical: float) -> str:
+def _kind_of(strength: Strength) -> str:
     """Return whether joints are level and upright, as in courses, or of all directions, as in rubble."""
-    strong = strength.evidence > 0.6 * typical
+    strong = strength.evidence > 0.6
     if not strong.any():
         return "coursed"
     angle, weight = strength.angle[strong], strength.evidence[strong]
@@ -303,7 +306,7 @@ def _kind_of(strength: Strength, typical: float) -> str:
 
 def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     """Return the stones of regions, in pixels of the work."""
-    bond = bond_of(regions, fields.strength, fields.typical, fields.colours, kind)
+    bond = bond_of(regions, fields.strength, fields.colours, kind)
     shapes = outline_shapes(regions, without_mortar(regions, fields.image, _REACH[kind]))
     count = np.bincount(regions.ravel())
     veiled = np.bincount(regions.ravel(), fields.hidden.ravel().astype(np.float64), len(count))

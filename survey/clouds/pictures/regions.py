@@ -11,7 +11,7 @@ from survey.arrays import Array, Bools, Ints
 from survey.clouds.extras import optional
 from survey.clouds.pictures.joints import WIDTH, Field, Strength
 
-__all__ = ["Borders", "borders_of", "closed_regions", "typical_strength"]
+__all__ = ["Borders", "borders_of", "closed_regions", "over_texture"]
 
 _WEAK = 0.3  # strength over that of a joint below which there is stone
 _APART = 2.0 * WIDTH  # distance between the middles of two regions [px]
@@ -37,11 +37,12 @@ class Borders:
     steps: Array
 
 
-def typical_strength(strength: Strength) -> float:
-    """Return the strength of a usual joint: the median of the crests that exceed the stone by far.
+def over_texture(strength: Strength) -> Strength:
+    """Return the strength of joints so that it is 1 at a usual joint; evidence is 0 at the texture of a stone.
 
     Crests are pixels that no neighbour across exceeds; grain has many weak ones, joints few strong ones. The
-    two classes are parted where the variance between them is largest (Otsu 1979).
+    two classes are parted where the variance between them is largest (Otsu 1979). Their medians are the texture
+    of a stone and a usual joint. So what is left of texture does not depend on how faint the joints of a picture are.
     """
     evidence = strength.evidence
     inner = evidence[1:-1, 1:-1]
@@ -49,15 +50,22 @@ def typical_strength(strength: Strength) -> float:
     down = (inner >= evidence[:-2, 1:-1]) & (inner > evidence[2:, 1:-1])
     crest = inner[(across | down) & (inner > 0.0)]
     if len(crest) < 10:
-        return 1.0
+        return strength
     values = np.sort(np.sqrt(crest[:: max(1, len(crest) // 200_000)]).astype(np.float64))
     sums, count = np.cumsum(values), np.arange(1, len(values) + 1)
     low, high = sums / count, (sums[-1] - sums) / np.maximum(len(values) - count, 1)
     between = count * (len(values) - count) * (low - high) ** 2
-    return float(np.median(values[int(np.argmax(between)) :]) ** 2)
+    parted = int(np.argmax(between))
+    texture, joint = (np.float32(np.median(part) ** 2) for part in (values[: parted + 1], values[parted:]))
+    return Strength(
+        np.maximum(evidence - texture, 0.0) / max(joint - texture, np.float32(1e-9)),
+        strength.upright / joint,
+        strength.level / joint,
+        strength.angle,
+    )
 
 
-def closed_regions(evidence: Field, typical: float, void: Bools) -> Ints:
+def closed_regions(evidence: Field, void: Bools) -> Ints:
     """Part a picture into regions along the crests of its joints.
 
     Regions grow from the places farthest from all joints, so that gaps of joints narrower than the stone are
@@ -65,8 +73,7 @@ def closed_regions(evidence: Field, typical: float, void: Bools) -> Ints:
 
     Parameters
     ----------
-    evidence : (h, w) strength of joints
-    typical : strength of a usual one
+    evidence : (h, w) of joints, over that of a usual one
     void : (h, w) where there is no wall
 
     Returns
@@ -75,11 +82,11 @@ def closed_regions(evidence: Field, typical: float, void: Bools) -> Ints:
     """
     from scipy.ndimage import distance_transform_edt, gaussian_filter, label, maximum_filter
 
-    free = (evidence < _WEAK * typical) & ~void
+    free = (evidence < _WEAK) & ~void
     far = gaussian_filter(distance_transform_edt(free).astype(np.float32), 0.5 * WIDTH)
     peaks = (far == maximum_filter(far, size=2 * round(_APART) + 1)) & (far > 1.0) & ~void
     seeds, _ = label(peaks, structure=np.ones((3, 3)))
-    height = (evidence / typical - 0.02 * far / max(float(far.max()), 1.0)).astype(np.float32)
+    height = (evidence - 0.02 * far / max(float(far.max()), 1.0)).astype(np.float32)
     return _watershed(height, seeds.astype(np.int64), ~void)
 
 

@@ -11,7 +11,8 @@ from survey.clouds.pictures.joints import WIDTH, Field, combined, grain_and_cont
 __all__ = ["joint_width", "resized", "resized_field"]
 
 _WIDTHS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)  # widths of joints that are tried [px]
-_SAMPLE = 512  # side of the parts of a picture that they are tried on [px]
+_SAMPLE = 512  # side of the parts of a picture that they are tried on, at most [px]
+_ENOUGH = 128.0  # side over the width of a joint from which a part is no larger: some courses of some stones
 _BEST = 3  # of five parts whose contrasts count: the others may show a door, a scaffold or a bush
 _GOOD = 0.7  # of the best contrast over grain, from which a finer resolution is preferred: it has the better edges
 
@@ -28,13 +29,12 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
     -------
     width [px], and the contrast of joints over grain at it
     """
-    parts = list(_parts(pixels.shape))
     widths = []
     for width in _WIDTHS:
         if min(pixels.shape[:2]) * WIDTH / width < 40:
             break
         ratios = []
-        for part in parts:
+        for part in _parts(pixels.shape, min(_SAMPLE, round(_ENOUGH * width))):
             heights = None if depth is None else resized_field(depth[part], width / WIDTH)
             channels, _, _ = channels_of(resized(pixels[part], width / WIDTH), heights)
             grain, contrast = grain_and_contrast(combined(channels))
@@ -43,16 +43,16 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
     if not widths:
         return WIDTH, 0.0
     best = max(ratio for _, ratio in widths)
-    return next((one, ratio) for one, ratio in widths if ratio >= _GOOD * best)
+    return next((one, ratio) for one, ratio in widths if ratio >= min(_GOOD * best, best))
 
 
-def _parts(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
-    """Yield parts of a picture: the middle, and the corners if they are others."""
+def _parts(shape: tuple[int, ...], side: int) -> Iterator[tuple[slice, slice]]:
+    """Yield parts of a picture, of a side [px]: the middle, and the corners if they are others."""
     height, width = shape[:2]
-    rows, columns = max(0, height - _SAMPLE), max(0, width - _SAMPLE)
+    rows, columns = max(0, height - side), max(0, width - side)
     places = {(rows // 2, columns // 2), (0, 0), (0, columns), (rows, 0), (rows, columns)}
     for top, start in sorted(places):
-        yield slice(top, top + _SAMPLE), slice(start, start + _SAMPLE)
+        yield slice(top, top + side), slice(start, start + side)
 
 
 def resized(pixels: NDArray[np.uint8], factor: float) -> NDArray[np.uint8]:

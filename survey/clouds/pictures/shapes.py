@@ -19,7 +19,7 @@ _SQUARE = 0.6  # sine of the angle between the sides beside it: 37°
 _MIN_STONE_WIDTH = 1.5  # width of a stone over that of a joint
 _SEEN = 0.25  # contrast of mortar over the scatter of the wall from which its edge can be seen
 _PIXEL = (
-    0.45  # standard deviation of a corner where two straight sides meet [px of the work]: of rendered walls
+    0.75  # standard deviation of a corner where two straight sides meet [px of the work]: of rendered walls
 )
 
 

@@ -13,11 +13,12 @@ import numpy as np
 from scipy.special import expit
 
 from survey.arrays import Array, Bools, Ints
+from survey.clouds.pictures.bond import LIKELY
 from survey.clouds.pictures.joints import WIDTH, Field, Strength
 
 __all__ = ["MISSING_WEIGHTS", "Line", "line_features", "lines_across", "propose_missing"]
 
-MISSING_WEIGHTS = (-8.76, 1.6, -5.96, -0.2, -8.25, 3.73)
+MISSING_WEIGHTS = (-14.73, -1.02, -3.07, 3.53, -11.73, 4.10)
 """Weights of: constant, strength, gaps, prominence, how much fuller the whole is, size."""
 
 _ACROSS = 0.6  # part of the height of a region that a line crosses at least
@@ -46,16 +47,13 @@ class Line:
     lean: int
 
 
-def propose_missing(
-    regions: Ints, strength: Strength, typical: float, hidden: Bools, least: float = 0.5
-) -> Ints:
+def propose_missing(regions: Ints, strength: Strength, hidden: Bools, least: float = LIKELY) -> Ints:
     """Part regions where a straight joint across them is likely.
 
     Parameters
     ----------
     regions : (h, w) numbers; those that are joined have one
-    strength : of joints
-    typical : of a usual joint
+    strength : of joints, 1 at a usual one
     hidden : (h, w) where joints cannot be seen
     least : probability from which a line is proposed
 
@@ -71,7 +69,7 @@ def propose_missing(
     while waiting:
         number, box, depth = waiting.pop()
         best: tuple[float, Bools] | None = None
-        for axis, whole, after, line in _lines(out, number, box, strength, typical, hidden):
+        for axis, whole, after, line in _lines(out, number, box, strength, hidden):
             chance = _probability(whole, after, line)
             if chance >= least and (best is None or chance > best[0]):
                 best = chance, after if axis else after.T
@@ -85,29 +83,29 @@ def propose_missing(
 
 
 def lines_across(
-    regions: Ints, strength: Strength, typical: float, hidden: Bools
+    regions: Ints, strength: Strength, hidden: Bools
 ) -> Iterator[tuple[tuple[slice, ...], int, Bools, Bools, Line]]:
     """Yield the best lines across all regions: the box of the region, the axis, and both as `_lines` does.
 
     Parameters
     ----------
-    regions, strength, typical, hidden : as for `propose_missing`
+    regions, strength, hidden : as for `propose_missing`
     """
     from scipy.ndimage import find_objects
 
     for number, box in enumerate(find_objects(regions), start=1):
         if box is not None:
-            for axis, whole, after, line in _lines(regions, number, box, strength, typical, hidden):
+            for axis, whole, after, line in _lines(regions, number, box, strength, hidden):
                 yield box, axis, whole, after, line
 
 
 def _lines(
-    regions: Ints, number: int, box: tuple[slice, ...], strength: Strength, typical: float, hidden: Bools
+    regions: Ints, number: int, box: tuple[slice, ...], strength: Strength, hidden: Bools
 ) -> Iterator[tuple[int, Bools, Bools, Line]]:
     """Yield the axis, the region, the part beyond and the line: upright (1) and level (0, transposed)."""
     mask = regions[box] == number
     for axis, field in ((1, strength.upright), (0, strength.level)):
-        ratio, whole, veil = np.minimum(field[box] / typical, _STRONGEST), mask, hidden[box]
+        ratio, whole, veil = np.minimum(field[box], _STRONGEST), mask, hidden[box]
         if axis == 0:
             ratio, whole, veil = ratio.T, whole.T, veil.T
         line = _best_line(ratio, whole, veil)
