@@ -25,6 +25,7 @@ from synthetic.buildings.rendered_walls import STYLES, RenderedWall, rasterised,
 __all__ = ["corner_errors", "main", "panoptic_quality", "picture_of"]
 
 _SHARED = ROOT.parent / "shared" / "data"
+_WEIGHTS = ROOT / "survey" / "clouds" / "pictures" / "weights.json"
 _PIXEL = 0.002  # of the masks of rubble, which are 1.0 × 1.2 m [m]
 _MATCHED = 3.0  # pixels of the work within which a corner belongs to a true one
 _WALLS = columns(
@@ -196,12 +197,16 @@ def main() -> None:
         "--masks", type=Path, default=_SHARED / "experiments" / "masks", help="folder of masks"
     )
     options.add_argument(
-        "--fit", type=int, metavar="N", help="fit the weights to N draws of each kind instead"
+        "--fit",
+        type=int,
+        metavar="N",
+        help="fit the weights of survey/clouds/pictures to N draws of each kind instead",
     )
     given = options.parse_args()
     if given.fit:
-        for name, weights in fitted(given.fit):
-            print(name, ", ".join(f"{one:.2f}" for one in weights))
+        rounded = {name: [round(float(one), 2) for one in weights] for name, weights in fitted(given.fit)}
+        lines = ",\n ".join(f"{json.dumps(name)}: {weights}" for name, weights in rounded.items())
+        _WEIGHTS.write_text(f"{{\n {lines}\n}}\n", encoding="utf-8")
         return
     rows = list(_photographs(given.photographs)) if (given.photographs / "boxes.json").is_file() else []
     rows += _masks(given.masks) if given.masks.is_dir() else []

@@ -27,7 +27,7 @@ Samples = list[tuple[Array, bool]]
 
 
 def fitted(draws: int) -> Iterator[tuple[str, Array]]:
-    """Yield names and weights, of borders in courses and rubble, and of missing joints, by walls clean and weathered."""
+    """Yield names and weights: of borders in courses, in rubble, and of missing joints, by all rendered walls."""
     walls = [one for seed in range(draws) for weathered in (False, True) for one in _walls(seed, weathered)]
     for kind in ("coursed", "rubble"):
         own = [(fields, true) for style, fields, true in walls if (style == "rubble") == (kind == "rubble")]

@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from sqlalchemy.orm import Session
 
 from archmodel.query.api import MAX_EXPRESSIONS, find, find_rows
@@ -20,8 +19,6 @@ from pipelines.toml.schema import nearest
 __all__ = ["SERIES", "STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
-
-_LEVEL = 0.02  # over the height of all stones: beds of a course scatter less, and courses are higher [-]
 
 STRESS = ("output", "stress")
 """Key that names the stones whose stress is wanted."""
@@ -189,11 +186,8 @@ def _without_course(item: str, records: Mapping[str, object]) -> str:
     stones = [record for record in records.values() if isinstance(record, StoneRecord)]
     if not stones or "course" not in item or any(stone.course is not None for stone in stones):
         return ""
-    bottoms = np.array([stone.outline[:, 2].min() for stone in stones])
-    tall = max(float(stone.outline[:, 2].max()) for stone in stones) - bottoms.min()
-    lowest = [
-        stone.code for stone, z in zip(stones, bottoms, strict=True) if z <= bottoms.min() + _LEVEL * tall
-    ]
+    lowest_top = min(float(stone.outline[:, 2].max()) for stone in stones)
+    lowest = [stone.code for stone in stones if stone.outline[:, 2].mean() < lowest_top]
     codes = ", ".join(f'"{code}"' for code in lowest)
     return f"no selected stone has a course: name stones by codes; the lowest are [{codes}]"
 

@@ -1,5 +1,6 @@
 """Point clouds with outlines of stones: from a scan and what was drawn over it to surveyed faces.
 
-Public: `CloudOptions`, `MaskOptions` (settings); `open_cloud` (cloud); `open_masks` (masks); `Wall`, `read_wall`
+Public: `CloudOptions`, `MASONRY`, `MaskOptions`, `OutlineSettings` (settings); `open_cloud` (cloud); `open_masks`
+(masks); `Wall`, `read_wall`
 (wall).
 """

@@ -26,8 +26,8 @@ from survey.clouds.outlines.outline import PROPOSED
 from survey.clouds.pictures.marks import mark_outlines
 from survey.clouds.pictures.photograph import Photograph, open_photograph
 from survey.clouds.pictures.proposal import Proposal, propose_outlines
-from survey.clouds.pictures.settings import OutlineSettings
 from survey.clouds.pictures.statistics import bond_statistics
+from survey.clouds.settings import OutlineSettings
 
 __all__ = ["INDEX", "PAGE", "DrawnOutlines", "OutlineRequest", "draw_outlines"]
 

@@ -74,9 +74,9 @@ def read_coco(
         else _size(annotations)
     )
     kinds = {category.get("id"): str(category.get("name")) for category in head.get("categories", [])}
-    names = [_category(annotation, kinds) for annotation in annotations]
-    stones = class_of_stones(path, Counter(name for name in names if name), category, "categories")
-    annotations = [one for one, name in zip(annotations, names, strict=True) if stones in (None, name)]
+    classes = [_category(annotation, kinds) for annotation in annotations]
+    stones = class_of_stones(path, Counter(name for name in classes if name), category, "categories")
+    annotations = [one for one, name in zip(annotations, classes, strict=True) if stones in (None, name)]
     outlines = tuple(_outlines(path, annotations, kinds, size, tolerance, chosen))
     name = Path(str(image.get("file_name", path.name))).name
     places = world_of(path.with_name(name)) or world_of(path)

@@ -240,9 +240,9 @@ def columns_of(names: Sequence[str], chosen: Mapping[str, str], where: str) -> d
             out[meaning] = chosen[meaning]
             continue
         for spelling in words:
-            name = spelled.get(spelling) or cut.get(spelling[:_CUT])
-            if name is not None and name not in (*out.values(), *chosen.values()):
-                out[meaning] = name
+            attribute = spelled.get(spelling) or cut.get(spelling[:_CUT])
+            if attribute is not None and attribute not in (*out.values(), *chosen.values()):
+                out[meaning] = attribute
                 break
     return out
 

@@ -8,8 +8,10 @@ upright it is, and the size of the smaller. Its weights were fitted to rendered 
 """
 
 import heapq
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -27,11 +29,11 @@ FEATURES = ("constant", "strength", "gaps", "fuller", "askew", "size", "step")
 
 WEIGHTS: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {
-        "coursed": (-2.34, -1.16, -8.60, -8.47, -1.54, 2.59, 2.27),
-        "rubble": (-6.48, 2.19, -4.23, -3.13, -2.70, 4.05, 1.95),
+        name: tuple(weights)
+        for name, weights in json.loads(Path(__file__).with_name("weights.json").read_text("utf-8")).items()
     }
 )
-"""Weights of `FEATURES` by the kind of masonry."""
+"""Weights by the kind of masonry, and of missing joints, that `python -m benchmarks.outlines --fit` fits."""
 
 LIKELY = 0.7
 """Probability from which a border stays. Photographs have blots that rendered walls lack: on twelve of them 4 % of

@@ -73,7 +73,8 @@ def grains(channels: list[Field]) -> NDArray[np.float32]:
     apart = 2 * round(WIDTH)
     usual = CONSISTENT * np.median(np.abs(out[:, :, apart:] - out[:, :, :-apart]), axis=(1, 2))
     least = ROUNDED / round(WIDTH)  # of the mean of its pixels
-    return (out / np.maximum(usual, least)[:, None, None]).astype(np.float32)
+    over: Field = (out / np.maximum(usual, least)[:, None, None]).astype(np.float32)
+    return over
 
 
 def _relief(depth: Field) -> Field:
@@ -137,10 +138,10 @@ def covered(green: Field, depth: Field | None) -> Bools:
     from scipy.ndimage import binary_closing, binary_opening, uniform_filter
 
     leaves = green < float(np.median(green)) - _GREEN
-    found = binary_opening(leaves, np.ones((3, 3), dtype=bool)) if leaves.any() else leaves
+    covering = binary_opening(leaves, np.ones((3, 3), dtype=bool)) if leaves.any() else leaves
     if depth is not None and np.isfinite(depth).any():
         before = np.nan_to_num(depth, nan=0.0) > float(np.nanmedian(depth)) + _BEFORE
-        found |= uniform_filter(before.astype(np.float32), 5) > 0.3
-    if not found.any():
-        return found
-    return np.asarray(binary_closing(found, np.ones((5, 5), dtype=bool)), dtype=np.bool_)
+        covering |= uniform_filter(before.astype(np.float32), 5) > 0.3
+    if not covering.any():
+        return covering
+    return np.asarray(binary_closing(covering, np.ones((5, 5), dtype=bool)), dtype=np.bool_)

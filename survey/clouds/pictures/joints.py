@@ -155,10 +155,11 @@ def step_evidence(colours: NDArray[np.float32]) -> Field:
             after, before = _sides(line, -slope, _REACHES[0])
             short += (after - before) ** 2
             long += _means(after - before, -slope, _LONG) ** 2
-        found = (short * long) ** np.float32(0.25)
-        np.maximum(best, found.T if steep else found, out=best)
+        mean = (short * long) ** np.float32(0.25)
+        np.maximum(best, mean.T if steep else mean, out=best)
     share = np.clip((best - _NO_STEP) / (_STEP - _NO_STEP), 0.0, 1.0)
-    return (_SUREST_STEP * share).astype(np.float32)
+    steps: Field = (_SUREST_STEP * share).astype(np.float32)
+    return steps
 
 
 def _slope(turn: float) -> tuple[bool, float]:

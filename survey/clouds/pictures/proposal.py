@@ -14,10 +14,10 @@ from survey.clouds.pictures.masonry import Named, name_stones
 from survey.clouds.pictures.photograph import Photograph
 from survey.clouds.pictures.regions import closed_regions, over_texture
 from survey.clouds.pictures.scale import joint_width, resized, resized_field
-from survey.clouds.pictures.settings import OutlineSettings
 from survey.clouds.pictures.shapes import outline_shapes, without_mortar
 from survey.clouds.pictures.splitting import propose_missing
 from survey.clouds.pictures.suitability import Findings, judge_picture, judge_result
+from survey.clouds.settings import OutlineSettings
 from survey.geometry.polygons import ring_area
 
 __all__ = [

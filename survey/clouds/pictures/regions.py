@@ -56,7 +56,9 @@ def over_texture(strength: Strength) -> Strength:
     low, high = sums / count, (sums[-1] - sums) / np.maximum(len(values) - count, 1)
     between = count * (len(values) - count) * (low - high) ** 2
     parted = int(np.argmax(between))
-    texture, joint = (np.float32(np.median(part) ** 2) for part in (values[: parted + 1], values[parted:]))
+    texture, joint = (
+        np.float32(np.median(crests) ** 2) for crests in (values[: parted + 1], values[parted:])
+    )
     return Strength(
         np.maximum(evidence - texture, 0.0) / max(joint - texture, np.float32(1e-9)),
         strength.upright / joint,

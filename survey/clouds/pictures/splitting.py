@@ -13,12 +13,12 @@ import numpy as np
 from scipy.special import expit
 
 from survey.arrays import Array, Bools, Ints
-from survey.clouds.pictures.bond import LIKELY
+from survey.clouds.pictures.bond import LIKELY, WEIGHTS
 from survey.clouds.pictures.joints import WIDTH, Field, Strength
 
 __all__ = ["MISSING_WEIGHTS", "Line", "line_features", "lines_across", "propose_missing"]
 
-MISSING_WEIGHTS = (-14.73, -1.02, -3.07, 3.53, -11.73, 4.10)
+MISSING_WEIGHTS = WEIGHTS["missing"]
 """Weights of: constant, strength, gaps, prominence, how much fuller the whole is, size."""
 
 _ACROSS = 0.6  # part of the height of a region that a line crosses at least

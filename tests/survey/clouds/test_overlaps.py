@@ -1,9 +1,11 @@
 """Outlines without a cloud that are drawn twice, or around all others."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from ground.errors import UsageError
 from survey.clouds.masks import open_masks
 from survey.clouds.settings import MaskOptions
 from tests.paths import ROOT
@@ -48,10 +50,18 @@ def test_a_frame_that_holds_all_others_is_one_overlap(tmp_path):
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="the cases lie beside the project")
-@pytest.mark.parametrize(
-    ("name", "size", "codes"),
-    [("o_twice.dxf", None, ["S1", "S3", "S5"]), ("g_whole_wall_too.json", (2.0, 1.2), ["S013"])],
-)
-def test_outlines_of_the_cases(name, size, codes):
-    review = open_masks(CASES / name, MaskOptions(depth=0.4, size=size)).review
-    assert [one.code for one in review if one.reason == "overlap"] == codes
+def test_outlines_drawn_twice_in_a_drawing():
+    review = open_masks(CASES / "o_twice.dxf", MaskOptions(depth=0.4)).review
+    assert [one.code for one in review if one.reason == "overlap"] == ["S1", "S3", "S5"]
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="the cases lie beside the project")
+def test_a_polygon_around_the_wall_has_a_category_of_its_own():
+    """Its class is asked for, as that of mortar; among the stones nothing overlaps."""
+    path, options = CASES / "g_whole_wall_too.json", MaskOptions(depth=0.4, size=(2.0, 1.2))
+    with pytest.raises(
+        UsageError, match=r"stone \(12\), wall \(1\); name that of the stones, e.g. --layer stone"
+    ):
+        open_masks(path, options)
+    stones = open_masks(path, replace(options, layer="stone"))
+    assert not [one for one in stones.review if one.reason == "overlap"]

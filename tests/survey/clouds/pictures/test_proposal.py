@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from survey.clouds.pictures.proposal import propose_outlines
-from survey.clouds.pictures.settings import OutlineSettings
+from survey.clouds.settings import OutlineSettings
 from tests.survey.clouds.pictures.walls import as_picture, courses, found_overlaps, painted, photograph
 
 pytest.importorskip("skimage")
