@@ -192,6 +192,11 @@ def points(order="yxz", separator=",", mark=".", codes=("W01-01:v", "W01-01:p"),
 
 LISTS = {
     "trimble": ("pnezd", "Point,Northing,Easting,Elevation,Code\r\n" + points().replace("\n", "\r\n"), None),
+    "trimble, below a title": (
+        "pnezd",
+        "Job: 2024-11\nPoint,Northing,Easting,Elevation,Code\n" + points(),
+        None,
+    ),
     "trimble, without head": ("pnezd", points(), None),
     "leica, blanks": ("pnezd", points(separator=" ", width=14), None),
     "liscad, tabs": ("penzd", "Pt\tE\tN\tH\tCode\n" + points("xyz", "\t"), None),
@@ -219,7 +224,6 @@ def test_point_lists_of_instruments_are_read_right(tmp_path, name, encoding):
 
 
 ODD_LISTS = {
-    "a header of two lines": ("Job: 2024-11\nPoint,Northing,Easting,Elevation,Code\n" + points(), (1, 2)),
     "no code": (points(codes=("", "")), (1,)),
     "another code": (points(codes=("W01-01:v", "tree")), (5,)),
     "a point twice": (points().replace("104,", "103,"), (4,)),
