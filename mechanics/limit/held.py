@@ -17,7 +17,8 @@ the same to the last digit however stones are turned and numbered, unless one of
 limit, and it is a load that was tried as it is written.
 
 Between the load at which a mechanism stops and the limit, stones may rest or move by the same law. So loads down to a
-hundredth below the limit are tried too, and one that falls lowers it.
+hundredth below the limit are tried too, and one that falls lowers it. Where the step that falls is not solved,
+methods and steps decide what holds from the load at which its motion would stop.
 
 A run asks of a rest whether forces that arise from nothing between joints that yield bring it about, and else goes on
 from these. So does the load that is found; where stones surely move then, as one does that stands on an edge wedged
@@ -68,11 +69,13 @@ class HeldLimit:
 
     Attributes
     ----------
-    held : largest λ that is known to be borne; 0: none but the dead load, infinite: nothing limits it [-]
+    held : largest λ that a step from rest bears; 0: none but the dead load, infinite: nothing limits it [-]
     lost : least λ that is known to be too much: the bound, or a step that falls; 0: the dead load is [-]
     force : (nc, 3) on the candidate of each contact under `held`, local frame [N]
     mechanism : velocities of the step that falls under `lost`; None where only the bound says that it is lost
     problems : contact problems that were solved
+    sure : the same as `held`; where the step that falls is not solved, the load at which its motion would stop, from
+        which methods and steps decide what holds [-]
     """
 
     held: float
@@ -80,6 +83,7 @@ class HeldLimit:
     force: Array
     mechanism: Mechanism | None
     problems: int
+    sure: float
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,7 @@ def held_limit(
     steps = _Steps(on, live)
     nothing = steps(0.0)
     if not bound.multiplier > 0.0 or not nothing.holds:
-        return HeldLimit(0.0, 0.0, nothing.force, _falling(on, nothing), 1)
+        return HeldLimit(0.0, 0.0, nothing.force, _falling(on, nothing), 1, 0.0)
     if np.isinf(bound.multiplier):
         return _without_bound(on, steps, nothing)
     search = _Search(steps, _unit(bound.multiplier), {0: nothing})
@@ -144,7 +148,7 @@ def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldL
             limit = _lasting(on, steps, search, search.limit(on, low, high, None))
             return replace(limit, problems=problems + limit.problems - len(tried))
         carried, best, load = load, trial, 2.0 * load
-    return HeldLimit(np.inf, np.inf, best.force, None, problems)
+    return HeldLimit(np.inf, np.inf, best.force, None, problems, np.inf)
 
 
 def _lasting(on: RigidAssembly, steps: "_Steps", search: "_Search", limit: HeldLimit) -> HeldLimit:
@@ -199,7 +203,10 @@ class _Search:
             low, high = self._neighbours(max(load for load in self.tried if load < high), high, None)
         best, worst = self.tried[low], self.tried.get(high)
         falls = None if worst is None else _falling(on, worst)
-        return HeldLimit(self._load(low), self._load(high), best.force, falls, len(self.tried))
+        held = sure = self._load(low)
+        if worst is not None and worst.error > _SURE:
+            sure = min(sure, max(worst.stops, 0.0))
+        return HeldLimit(held, self._load(high), best.force, falls, len(self.tried), sure)
 
     def _below(self, low: int) -> Iterator[int]:
         """Yield multiples below one, ever farther, down to a hundredth of it."""

@@ -157,7 +157,13 @@ def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
     match question:
         case LoadQuestion():
             facts |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
-            facts |= {"bound": None, "candidate_converged": None, "limit": 0.0, "limit_lost": 0.0}
+            facts |= {
+                "bound": None,
+                "candidate_converged": None,
+                "limit": 0.0,
+                "limit_lost": 0.0,
+                "limit_sure": 0.0,
+            }
         case ThrustQuestion():
             kind = "settlement" if question.settles else "thrust"
             facts |= {
@@ -183,13 +189,14 @@ def _load(
     live = question.live
     bound = limit_load(on, live)
     candidate = _candidate(on, live, bound)
-    limit, lost, kind = _limit(on, live, bound, candidate)
+    limit, lost, sure, kind = _limit(on, live, bound, candidate)
     facts: dict[str, Any] = {
         "name": question.name,
         "kind": "load",
         "meaning": str(live),
         "limit": _number(limit.multiplier),
         "limit_lost": _number(lost),
+        "limit_sure": _number(sure),
         "limit_kind": kind,
         "bound": _number(bound.multiplier),
         "bound_kind": "associative friction, rigorous upper bound",
@@ -246,20 +253,21 @@ def _without_friction_across(on: RigidAssembly, live: LiveLoad, candidate: Limit
 
 def _limit(
     on: RigidAssembly, live: LiveLoad, bound: LimitLoad, candidate: LimitLoad | None
-) -> tuple[LimitLoad, float, str]:
-    """Return the limit with its mechanism, the least load that is known to be lost, and what the limit is.
+) -> tuple[LimitLoad, float, float, str]:
+    """Return the limit with its mechanism, the least load that is lost, up to which it is sure, and what it is.
 
     As a rule the largest load that a step from rest holds, and how the stones begin to fall under the least that it
     loses.
     """
     if np.isnan(bound.multiplier):
-        return bound, 0.0, _BY_RUNS
+        return bound, 0.0, 0.0, _BY_RUNS
     if on.crushing is not None and candidate is not None:
-        return candidate, bound.multiplier, _CRUSHED
+        return candidate, bound.multiplier, candidate.multiplier, _CRUSHED
     lowest = None if candidate is None or not candidate.converged else candidate.lowest.multiplier
     confirmed = held_limit(on, live, bound, lowest)
     if confirmed.lost == 0.0:
-        return candidate or bound, bound.multiplier, _UNSURE
+        limit = candidate or bound
+        return limit, bound.multiplier, limit.multiplier, _UNSURE
     limit = replace(
         bound,
         flow=Flow.COULOMB,
@@ -268,7 +276,7 @@ def _limit(
         mechanism=confirmed.mechanism or bound.mechanism,
         programmes=confirmed.problems,
     )
-    return limit, confirmed.lost, _BY_RUNS
+    return limit, confirmed.lost, confirmed.sure, _BY_RUNS
 
 
 def _checked_limit(limit: LimitLoad, lost: float, candidate: LimitLoad | None) -> LimitLoad:
@@ -455,8 +463,10 @@ def _sentence(facts: dict[str, Any]) -> str:
     if facts["limit"] is None:
         return f"{facts['name']}: {facts['outcome']}{_dynamics(facts)}"
     lost = "" if facts["limit_lost"] is None else f"; {facts['limit_lost']:.4g} is lost"
-    how = {_CRUSHED: "candidate, as stones crush", _UNSURE: "NOT SURE, candidate or bound"}
     limit = "held" if facts["limit"] else "nothing beside the dead load is held"
+    if facts["limit_sure"] < facts["limit"]:
+        lost += f" by a step that is NOT SOLVED, and runs may fall from {facts['limit_sure']:.4g} on"
+    how = {_CRUSHED: "candidate, as stones crush", _UNSURE: "NOT SURE, candidate or bound"}
     stands = how.get(facts["limit_kind"], f"{limit}{lost}")
     bound = "no bound" if facts["bound"] is None else f"bound {facts['bound']:.4g}"
     text = f"{facts['name']}: λ = {facts['limit']:.4g} ({stands}), {bound}{_caution(facts)}"

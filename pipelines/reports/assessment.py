@@ -73,6 +73,8 @@ def _lead(summary: Mapping[str, Any]) -> str:
     text += f"weight, {kilonewtons(load['limit'] * summary['weight'])}"
     if load["limit_lost"] is not None:
         text += f", and fall at {100 * load['limit_lost']:.4g} %"
+    if load["limit_sure"] < load["limit"]:
+        text += f", in a step that is not solved: they may fall from {100 * load['limit_sure']:.4g} % on"
     return f"{text}. Capacity against demand: {_demand(load)}. "
 
 

@@ -60,6 +60,14 @@ def test_runs_confirm_the_limit_or_do_not(on, monkeypatch):
     assert "by the dynamics CONFIRMED: held at 0.2497, lost at 0.25" in told["headline"]
 
 
+def test_a_limit_whose_step_is_not_solved_says_from_which_load_runs_may_fall(on, monkeypatch):
+    nothing = np.zeros((len(on.contacts), 3))
+    for sure, words in ((0.24, "0.25 is lost)"), (0.2, "NOT SOLVED, and runs may fall from 0.2 on)")):
+        found = HeldLimit(0.24, 0.25, nothing, None, 1, sure)
+        monkeypatch.setattr(answers, "held_limit", lambda *_, found=found: found)
+        assert words in asked(on, monkeypatch, lambda one: one)["headline"]
+
+
 def test_what_was_not_sought_is_said(on, monkeypatch):
     monkeypatch.setattr(answers, "_SOUGHT", 0)
     told = asked(on, monkeypatch, lambda one: one)
@@ -69,7 +77,7 @@ def test_what_was_not_sought_is_said(on, monkeypatch):
 
 def test_a_step_that_moves_what_a_run_brings_to_rest_leaves_the_limit_to_runs(on, monkeypatch):
     nothing = np.zeros((len(on.contacts), 3))
-    monkeypatch.setattr(answers, "held_limit", lambda *_: HeldLimit(0.0, 0.0, nothing, None, 1))
+    monkeypatch.setattr(answers, "held_limit", lambda *_: HeldLimit(0.0, 0.0, nothing, None, 1, 0.0))
     told = asked(on, monkeypatch, lambda one: one)
     assert "λ = 0.25 (NOT SURE, candidate or bound), bound 0.25" in told["headline"]
     assert "held at 0.2, lost at 0.21" in told["headline"]

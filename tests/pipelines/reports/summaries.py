@@ -34,6 +34,7 @@ def assessed(**changed):
         "bound": 0.13,
         "limit": 0.125,
         "limit_lost": 0.1252,
+        "limit_sure": 0.125,
         "candidate": 0.125,
         "candidate_lowest": 0.125,
         "candidate_converged": True,
