@@ -8,6 +8,7 @@ calls beyond them, which ``--record-others`` renews alone. ``--installed`` measu
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -70,24 +71,38 @@ with open(sys.argv[1], "w") as file:
 """
 
 _CALLED = """
-import json, signal, sys
+import signal, sys
 from moma.cli import app
-from ground.kernels.uses import called
 ended = []
 def end(*_):
     ended.append(True)
     raise KeyboardInterrupt
 # the signal comes once: that of a limit of the system comes again each second, while results are written
 signal.signal(signal.SIGPROF, end)
-signal.setitimer(signal.ITIMER_PROF, int(sys.argv[2]))
+signal.setitimer(signal.ITIMER_PROF, int(sys.argv[1]))
 code = 0
 try:
-    code = app(sys.argv[3:], prog_name="moma", standalone_mode=False)
+    code = app(sys.argv[2:], prog_name="moma", standalone_mode=False)
 except KeyboardInterrupt:
     print("ended after its time", file=sys.stderr)
-with open(sys.argv[1], "w") as file:
-    json.dump([vars(one) for one in called()], file)
 sys.exit(0 if ended else code)
+"""
+
+# what each process of a command writes as it ends or sends an answer, as those of trials are killed afterwards;
+# Python imports it by its name
+_EACH = """
+import atexit, json, os, pathlib, sys
+from multiprocessing.connection import Connection
+def write():
+    if "numba" in sys.modules:
+        from ground.kernels.uses import called
+        text = json.dumps([vars(one) for one in called()])
+        pathlib.Path(__file__).with_name(f"{os.getpid()}.json").write_text(text)
+def noted(self, answer, send=Connection.send):
+    write()
+    send(self, answer)
+Connection.send = noted
+atexit.register(write)
 """
 
 
@@ -138,17 +153,22 @@ def _matrix(folder: Path, known: list[dict[str, object]]) -> list[dict[str, obje
     """Return the kernels that the commands of the matrix call and that are not known yet, in the user's own cache."""
     small_geology(folder / "geology")
     uses: list[dict[str, object]] = []
-    found = folder / "called.json"
-    path = os.pathsep.join((os.getcwd(), *filter(None, sys.path)))
+    called = folder / "called"
     for line in MATRIX:
         arguments = line.format(sample=SAMPLE.resolve(), geology=folder / "geology").split()
-        found.unlink(missing_ok=True)
-        call = [sys.executable, "-c", _CALLED, str(found), str(_LONGEST), *arguments]
+        shutil.rmtree(called, ignore_errors=True)
+        called.mkdir()
+        (called / "sitecustomize.py").write_text(_EACH, encoding="utf-8")
+        path = os.pathsep.join((str(called), os.getcwd(), *filter(None, sys.path)))
+        call = [sys.executable, "-c", _CALLED, str(_LONGEST), *arguments]
         environment = os.environ | {"PYTHONPATH": path}
         # a command that fails calls nothing of what it is listed for
         subprocess.run(call, env=environment, cwd=folder, stdout=subprocess.DEVNULL, check=True)
-        called = json.loads(found.read_text(encoding="utf-8"))
-        fresh = [one for one in called if one not in known and one not in uses]
+        found = [use for file in sorted(called.glob("*.json")) for use in json.loads(file.read_text("utf-8"))]
+        fresh = list[dict[str, object]]()
+        for use in found:
+            if use not in (*known, *uses, *fresh):
+                fresh.append(use)
         print(f"{len(fresh):3d} more kernels: moma {line}", flush=True)
         uses += fresh
     return uses

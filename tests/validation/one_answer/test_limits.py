@@ -19,7 +19,7 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.scene.shapes import LIMESTONE, bond, wall
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material
-from tests.validation.one_answer.models import ASSEMBLIES, CURVED, MODELS, model
+from tests.validation.one_answer.models import ASSEMBLIES, MODELS, REFUSED, model
 from tests.validation.one_answer.scenes import SCENES
 from tests.validation.wild.scene_list import Truth
 
@@ -126,9 +126,10 @@ def test_models_are_held_and_lost_as_their_limits_say(name, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not ASSEMBLIES.exists(), reason="the models stand beside the repository")
-def test_a_model_with_curved_joints_is_refused(tmp_path):
-    with pytest.raises(GeometryError, match="more than 32 convex parts"):
-        model(CURVED, tmp_path)
+@pytest.mark.parametrize("name", REFUSED)
+def test_models_with_curved_joints_or_folded_faces_are_refused(name, tmp_path):
+    with pytest.raises(GeometryError, match=REFUSED[name][1]):
+        model(name, tmp_path)
 
 
 def dome(form, around=12, rings=5, top=60.0):
