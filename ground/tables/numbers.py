@@ -5,7 +5,17 @@ import re
 
 from ground.errors import SurveyError
 
-__all__ = ["EMPTY", "FARTHEST", "is_number", "parse_length", "parse_number", "shown", "unreadable"]
+__all__ = [
+    "EMPTY",
+    "FARTHEST",
+    "has_groups",
+    "is_number",
+    "parse_length",
+    "parse_number",
+    "shown",
+    "ungrouped",
+    "unreadable",
+]
 
 EMPTY = frozenset(("-", "--", "–", "—", "n/a", "na", "nan", "none", "null", "?"))
 """Words for a value that is not known, in lower case."""
@@ -14,6 +24,11 @@ FARTHEST = 1e8
 """Largest coordinate: no site frame reaches farther, and sums of squares stay finite [m]."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_GROUPED = re.compile(
+    r"[+-]?\d{1,3}(?:(?P<mark>['’\u00a0\u202f])\d{3}(?:(?P=mark)\d{3})*(?:[.,]\d*)?|(?: \d{3})+[.,]\d+)",
+    re.ASCII,
+)
+_GROUPS = re.compile(r"\d['’\u00a0\u202f ]\d{3}", re.ASCII)
 
 
 def parse_number(text: str, what: str, where: str, farthest: float = FARTHEST) -> float:
@@ -37,6 +52,24 @@ def parse_number(text: str, what: str, where: str, farthest: float = FARTHEST) -
 def is_number(text: str, commas: bool = False) -> bool:
     """Return whether a text is a decimal number; with `commas`, also one with a decimal comma."""
     return _NUMBER.fullmatch(text.replace(",", ".", 1) if commas else text) is not None
+
+
+def has_groups(row: str) -> bool:
+    """Return whether a row may have numbers whose thousands are set apart."""
+    return _GROUPS.search(row) is not None
+
+
+def ungrouped(text: str) -> str:
+    """Return a number without the marks between its thousands, any other text as it is.
+
+    Points and commas stay, which may be decimal marks. A blank counts before decimals only, as it may part two numbers.
+
+    Examples
+    --------
+    >>> ungrouped("2'683'400.968"), ungrouped("1 248 078,34"), ungrouped("12 345"), ungrouped("1.234,5")
+    ('2683400.968', '1248078,34', '12 345', '1.234,5')
+    """
+    return re.sub(r"['’\s]", "", text) if _GROUPED.fullmatch(text) else text
 
 
 def parse_length(text: str, what: str, where: str) -> float:

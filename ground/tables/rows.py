@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ground.errors import SurveyError, UsageError
-from ground.tables.numbers import shown, unreadable
+from ground.tables.numbers import has_groups, shown, ungrouped, unreadable
 from ground.tables.text_lines import TextLines
 
 __all__ = ["DATE_REMEDY", "ListRows", "Row", "TextRows", "cell_text", "is_workbook", "open_rows"]
@@ -102,11 +102,17 @@ class TextRows:
     def cells(self, row: str, line: int, limit: int = 0) -> list[str]:
         """Split a row into its fields, the last of at most `limit` with all that is left.
 
+        Numbers come without marks between their thousands.
+
         Raises
         ------
         SurveyError
             if its quotes are wrong
         """
+        values = self._split(row, line, limit)
+        return [ungrouped(value) for value in values] if has_groups(row) else values
+
+    def _split(self, row: str, line: int, limit: int) -> list[str]:
         if '"' in row and self.delimiter:
             try:
                 values = self._quoted(row)
@@ -313,11 +319,11 @@ def _filled(rows: Sequence[Sequence[Any]]) -> list[tuple[int, list[str]]]:
 
 
 def cell_text(cell: Any) -> str:
-    """Return a cell as text; whole numbers without decimals, nothing for None."""
+    """Return a cell as text; whole numbers without decimals, numbers without marks between thousands, nothing for None."""
     if cell is None:
         return ""
     if isinstance(cell, float):
         return (
             str(int(cell)) if math.isfinite(cell) and cell.is_integer() and abs(cell) < 1e15 else repr(cell)
         )
-    return " ".join(str(cell).split())
+    return ungrouped(" ".join(str(cell).split()))
