@@ -210,6 +210,14 @@ class SurveyChoices:
             help="Abbreviations of kinds, e.g. 'SPR=springer,VOU=voussoir', or a file.",
         ),
     ] = None
+    roles: Annotated[
+        str | None,
+        typer.Option(
+            "--roles",
+            metavar="WORDS",
+            help="Words for roles of points (vertex, point, station, control), e.g. 'Fl=point,HP=control'.",
+        ),
+    ] = None
     sigma: Annotated[
         float | None,
         typer.Option(
@@ -223,7 +231,8 @@ class SurveyChoices:
         typer.Option(
             "--unit",
             metavar="UNIT",
-            help="Unit of coordinates: m, dm, cm, mm, ft or in; default: m, or what the columns say.",
+            help="Unit of coordinates, with --cloud of the outlines: m, dm, cm, mm, ft or in; default: m, or as the "
+            "file says.",
         ),
     ] = None
 

@@ -489,15 +489,15 @@ def _outlined(
 
 
 def _check_fitting(name: str, choices: Mapping[str, object]) -> None:
-    """Refuse options of tables and of solids with other formats, and a unit where lengths are metres."""
+    """Refuse options of tables and of solids with other formats, and a unit with files that are in metres."""
     for option in ("snap", "planes", "up", "repair"):
         if choices.get(option) is not None and name != "solids":
             raise UsageError(f"--{option} with format {name}", remedy="it is for --format solids")
-    for option in ("columns", "sheet", "kinds"):
+    for option in ("columns", "sheet", "kinds", "roles"):
         unfit = ("moma", "solids") if option == "kinds" else ("moma", "solids", "cloud", "masks")
         if choices[option] is not None and name in unfit:
             raise UsageError(f"--{option} with format {name}", remedy="it is for tables and lists of points")
-    if choices["unit"] is not None and name in ("moma", "cloud"):
+    if choices["unit"] is not None and name == "moma":
         raise UsageError(f"--unit with format {name}", remedy="its lengths are metres")
 
 

@@ -9,6 +9,7 @@ from ground.tables.columns import UNITS, length_unit
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
 from survey.formats.tables.kinds import read_kinds
+from survey.formats.tables.roles import read_roles
 
 __all__ = ["UNITS", "Source", "format_of_all", "reading_options", "solid_options", "survey_sources"]
 
@@ -126,6 +127,7 @@ def reading_options(
     columns: str | None = None,
     sheet: str | None = None,
     kinds: str | None = None,
+    roles: str | None = None,
 ) -> ReadingOptions:
     """Gather the options of a reader; None keeps the default.
 
@@ -139,6 +141,7 @@ def reading_options(
     columns : names of columns of a table by what they are, e.g. ``block=Stein,x=Rechts``
     sheet : of a workbook
     kinds : abbreviations of kinds, e.g. ``SPR=springer``, or a file with them
+    roles : words for roles of points, e.g. ``Fl=point,HP=control``
 
     Raises
     ------
@@ -148,6 +151,8 @@ def reading_options(
     options = ReadingOptions(codes=codes, columns=columns, sheet=sheet)
     if kinds is not None:
         options = replace(options, kinds=read_kinds(kinds))
+    if roles is not None:
+        options = replace(options, roles=read_roles(roles))
     if kind is not None:
         options = replace(options, kind=kind.lower())
     if header is not None:

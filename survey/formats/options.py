@@ -26,7 +26,7 @@ class ReadingOptions:
     columns : names of columns by what they are, e.g. ``block=Stein,x=Rechts``; None: known names
     sheet : of a workbook; None: the only one
     kinds : kinds of stones by their abbreviation in lower case
-    sommet : whether the role S is a corner, "sommet", instead of a station
+    roles : roles of points by words that are the user's own, in lower case
     known_kinds : all kinds that there are; empty: any
     flat : distance from a plane within which the corners of a polygon of a solid count as plane [m]; at least `snap`
     snap : tolerance within which matching faces of neighbouring solids are brought into one plane [m]; 0: none is
@@ -46,7 +46,7 @@ class ReadingOptions:
     sheet: str | None = None
     kinds: Mapping[str, str] = field(default_factory=dict)
     known_kinds: frozenset[str] = frozenset()
-    sommet: bool = False
+    roles: Mapping[str, str] = field(default_factory=dict)
     flat: float = 0.0
     snap: float = 0.0
     planes: float = 0.005

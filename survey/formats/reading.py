@@ -10,7 +10,7 @@ from survey.formats.options import ReadingOptions, whole
 from survey.formats.points.geojson import open_geojson
 from survey.formats.points.gsi import open_gsi
 from survey.formats.points.survey_xml import open_jobxml, open_landxml
-from survey.formats.tables.reader import open_csv, open_penzd, open_pnezd
+from survey.formats.tables.reader import is_table, open_csv, open_penzd, open_pnezd
 from survey.records.survey import Survey, SurveyStream
 
 __all__ = [
@@ -114,6 +114,8 @@ def format_of(path: Path) -> str:
     for format, endings in ENDINGS.items():
         if ending in endings:
             return format
+    if WAYS_OUT.get(ending) == _LISTS and is_table(path):
+        return "csv"
     remedy = WAYS_OUT.get(ending, f"give --format, one of {', '.join(FORMATS)}")
     raise UsageError(f"the ending {ending!r} does not tell the format", where=str(path), remedy=remedy)
 

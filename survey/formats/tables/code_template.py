@@ -4,42 +4,22 @@ A template is text with fields in braces, e.g. ``{block}:{role}`` or ``{block} {
 between them stands for itself, a blank for one or more. A field with a question mark may be missing, together with the
 text before it; ``{*}`` is read and ignored. A description has one reading or none: an ambiguous template is refused.
 Where the name of a stone is made of its zone, course and number, ``{number}`` takes the place of ``{block}``. A role
-may follow a name at once, as in ``12-4E``: then the name ends in a digit.
+or kind may follow a name at once, as in ``12-4E``: then the name ends in a digit. A field with a width, ``{course:2}``,
+has so many characters, whatever follows.
 """
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 from ground.errors import UsageError
 from survey.formats.fields import code_of
+from survey.formats.tables.roles import CONTROL, ROLES, is_bare, role_of, roles_with
 
-__all__ = ["CONTROL_WORDS", "ROLES", "STATION", "CodeFields", "CodeTemplate", "is_bare", "role_of"]
+__all__ = ["CodeFields", "CodeTemplate"]
 
-STATION = "station"
-"""The role of a position of the instrument."""
-
-ROLES: Mapping[str, str] = {
-    **dict.fromkeys(("v", "vertex", "corner", "edge", "outline"), "vertex"),
-    **dict.fromkeys(("e", "ecke", "eckpunkt", "rand", "sommet", "coin", "vertice", "spigolo", "esquina"), "vertex"),
-    **dict.fromkeys(("vértice",), "vertex"),
-    # line codes of field software: a line begins, goes on, ends, is closed
-    **dict.fromkeys(("b", "beg", "begin", "start", "l", "line", "end", "c", "cls", "close"), "vertex"),
-    **dict.fromkeys(("p", "point", "pt", "face", "surface", "f", "punkt", "fläche", "flaeche"), "point"),
-    **dict.fromkeys(("flächenpunkt", "face point", "punto", "superficie", "faccia", "cara"), "point"),
-    **dict.fromkeys(("s", "st", "stn", "stp", "station", "standpunkt", "stazione", "estación"), STATION),
-}  # fmt: skip
-"""Roles of points by the words for them."""
-
-CONTROL_WORDS = frozenset(
-    ("fp", "festpunkt", "pp", "passpunkt", "gcp", "control", "tie", "appui", "punto fisso", "punto fijo")
-)
-"""Descriptions of control points, which belong to no stone."""
-
-_ROLE_WORDS = "|".join(sorted((re.escape(role) for role in ROLES if " " not in role), key=len, reverse=True))
-_ROLE_LETTERS = re.escape("".join(sorted(set("".join(ROLES)) - {" "})))
 _CODE, _CODE_LETTERS = r"[^\W_][\w.+/:-]{0,63}", r"\w.+/:-"
 _FREE, _FREE_LETTERS = r"[^\W_][^\t%s]{0,63}", r"^\t%s"  # all but what separates fields
 _FIELDS = {  # pattern of each field, and its characters
@@ -48,13 +28,14 @@ _FIELDS = {  # pattern of each field, and its characters
     "kind": (r"[^\W\d_][\w-]{0,31}", r"\w-"),
     "course": (r"[0-9]{1,6}", r"0-9"),
     "number": (r"[0-9]{1,6}[^\W\d_]?", r"^\W_"),
-    "role": (rf"(?i:{_ROLE_WORDS})", _ROLE_LETTERS + _ROLE_LETTERS.upper()),
 }
-_JOINED = ("block", "course", "number")  # fields that end in a digit where a role follows at once
+_JOINED = ("block", "course", "number")  # fields that end in a digit where a role or kind follows at once
+_LETTERS = r"[^\W\d_]{1,32}"  # kind that follows at once
 _NAMED = ("zone", "course", "number")  # fields that name a stone together
 _WORD = r"[0-9]{1,6}|[^\W\d_]{1,8}", r"^\W_"  # a course of these, or a word where there is none, as in arches
 _IGNORED = "*"
 _FIELD = re.compile(r"\{([^{}]*)\}")
+_WIDTH = re.compile(r"([^:?]*)(?::([1-9][0-9]?))?(\?)?")
 _REMEDY = "write e.g. {block}:{role} or {block} {kind} {course} {role}"
 _MARKS = " /;,|:"  # which separate fields, and are in few names
 _LONG = (("{block}", "{kind}", "{course}", "{role}"), ("{block}", "{course}", "{kind}", "{role}"))
@@ -69,6 +50,8 @@ _USUAL = (
     *(mark.join(fields) for mark in _MARKS for fields in _SHORT),
     *("{block} {kind} {course?} {role}", "{block}.{kind}.{role}"),
     *("{block}_{role}", "{block}-{role}", "{block}.{role}", "{role} {block}", "{role}:{block}"),
+    *(f"{name}{{kind}}{role}" for name in ("{course:2}{number:2}", "{block}") for role in (" {role?}", "")),
+    "{block} {role?}",
     *(
         "{block} {kind}",
         "{kind} {block} {role}",
@@ -79,6 +62,7 @@ _USUAL = (
     *("{block} {kind} {role} {*}", "{block}{role}", "{block}{role} {*}", "{block}", "{block} {*}"),
 )
 _CORNERS = 3  # of the smallest stone
+_STONES_OF_KIND = 2  # stones for each kind, on average, from which letters that end names are kinds
 
 
 @dataclass(frozen=True)
@@ -105,7 +89,7 @@ class CodeTemplate:
     Parameters
     ----------
     text : the template
-    sommet : whether the role S is a corner, "sommet", instead of a station
+    roles : of points by words that are the user's own
 
     Raises
     ------
@@ -113,14 +97,19 @@ class CodeTemplate:
         if it has no block, has an unknown field, or is ambiguous
     """
 
-    def __init__(self, text: str, sommet: bool = False) -> None:
-        self.text, self._sommet = text, sommet
+    def __init__(self, text: str, roles: Mapping[str, str] | None = None) -> None:
+        self.text, self._words = text, roles or {}
+        self._roles = roles_with(self._words)
         parts = _FIELD.split(text.strip())
-        self.fields = tuple(name.removesuffix("?") for name in parts[1::2])
         self._literals = parts[::2]
-        self._optional = [name.endswith("?") for name in parts[1::2]]
         if any("{" in literal or "}" in literal for literal in self._literals):
             raise UsageError(f"code template {text!r} has a brace without its other", remedy=_REMEDY)
+        matches = [_WIDTH.fullmatch(field) for field in parts[1::2]]
+        self.fields = tuple(
+            text if match is None else match[1] for text, match in zip(parts[1::2], matches, strict=True)
+        )
+        self._optional = [match is not None and bool(match[3]) for match in matches]
+        self._widths = {match[1]: int(match[2]) for match in matches if match is not None and match[2]}
         self._check_fields()
         self._numbered = "block" not in self.fields
         self._matches = [self._compiled(variant) for variant in self._variants()]
@@ -137,30 +126,42 @@ class CodeTemplate:
             kind=None if kind is None else kind.lower(),
             course=int(course) if course is not None and course.isdigit() else None,
             zone=fields.get("zone"),
-            role=role_of(fields.get("role") or "v", self._sommet),
+            role=role_of(fields.get("role") or "v", self._roles) or "vertex",
         )
 
     def expected(self, description: str, others: Sequence[str]) -> str:
         """Return the remedy for a description that does not fit: the usual template that fits it and others."""
-        rows = [row for row in (description, *others) if not is_bare(row)]
+        rows = [row for row in (description, *others) if not is_bare(row, self._roles)]
+        words = {row: None for row in rows if not any(map(str.isdigit, row))}
+        if len(words) < len(rows) / 2:  # stones are numbered, so that these are none
+            rows = [row for row in rows if row not in words]
+        else:
+            words = {}
         for text in _USUAL:
-            template = CodeTemplate(text)
+            template = CodeTemplate(text, self._words)
             fields = [template.parse(row) for row in rows]
             if rows and text != self.text and _is_sensible(text, fields):
-                return f'it would be read by --codes "{text}"'
+                meant = ",".join(f"{word}={CONTROL}" for word in words)
+                return f'it would be read by --codes "{text}"' + (
+                    f'; if points {", ".join(words)} belong to no stone, also give --roles "{meant}"'
+                    if words
+                    else ""
+                )
         return (
-            f"correct it, or say by --codes how the codes are built; fields are {', '.join(_FIELDS)}, and {{*}} for "
-            "what is ignored"
+            f"correct it, or say by --codes how the codes are built; fields are {', '.join((*_FIELDS, 'role'))}, and "
+            "{*} for what is ignored"
         )
 
     def _check_fields(self) -> None:
         named = [field for field in self.fields if field != _IGNORED]
         for name in named:
-            if name not in _FIELDS:
-                allowed = ", ".join((*_FIELDS, _IGNORED))
+            if name not in (*_FIELDS, "role"):
+                allowed = ", ".join((*_FIELDS, "role", _IGNORED))
                 raise UsageError(
                     f"code template {self.text!r} has a field {name!r}", remedy=f"fields: {allowed}"
                 )
+            if name in self._widths and name == "role":
+                raise UsageError(f"code template {self.text!r} gives a role a width", remedy="leave it out")
             if named.count(name) > 1:
                 raise UsageError(f"code template {self.text!r} has {{{name}}} twice", remedy="keep one")
         names = [name for name in ("block", "number") if name in named]
@@ -199,46 +200,60 @@ class CodeTemplate:
         free = "".join(
             re.escape(literal) for literal in sorted(literals) if not re.match(f"[{_CODE_LETTERS}]", literal)
         )
+        usual = {**_FIELDS, "role": _pattern_of_roles(self._words)}
         if self._numbered:
             marks = re.escape("".join(sorted(literals)))
             apart = rf"[^\W_][^\s{marks}]{{0,63}}", rf"^\s{marks}"
             wide = {
-                **_FIELDS,
+                **usual,
                 "zone": apart,
                 "kind": (rf"[^\W\d_][^\s{marks}]{{0,31}}", apart[1]),
                 "course": _WORD,
             }
         else:
-            wide = {**_FIELDS, "block": (_FREE % free, _FREE_LETTERS % free)}
-        fields = wide if _is_clear(wide, names, between) else _FIELDS
-        if not _is_clear(fields, names, between):
-            one, two, literal = _unclear(fields, names, between)
+            wide = {**usual, "block": (_FREE % free, _FREE_LETTERS % free)}
+        fixed = {name: _fixed(name, width, self._numbered) for name, width in self._widths.items()}
+        fields = (
+            {**wide, **fixed} if _is_clear({**wide, **fixed}, names, between, fixed) else {**usual, **fixed}
+        )
+        if not _is_clear(fields, names, between, fixed):
+            one, two, literal = _unclear(fields, names, between, fixed)
             raise UsageError(
                 f"code template {self.text!r} can be read in two ways: {literal!r} does not separate "
                 f"{{{one}}} from {{{two}}}",
-                remedy="separate them by a character that neither of them has, such as a blank",
+                remedy="separate them by a character that neither of them has, such as a blank; or give their width, "
+                f"{{{one}:2}}",
             )
-        pattern = _literal(first)
+        pattern, before = _literal(first), ""
         for name, literal, after in zip(names, [*between, last], [*names[1:], ""], strict=True):
-            if _is_joined(name, literal, after):
-                pattern += f"(?P<{name}>{fields[name][0]}(?<=[0-9]))"
-            elif name == _IGNORED:
+            joined = name not in fixed and _is_joined(name, literal, after)
+            if name == _IGNORED:
                 pattern += (rf"[^{re.escape(literal[0])}]*" if literal else ".*") + _literal(literal)
             else:
-                pattern += f"(?P<{name}>{fields[name][0]}){_literal(literal)}"
+                pattern_of_field = _LETTERS if name == "kind" and before else fields[name][0]
+                pattern += (
+                    f"(?P<{name}>{pattern_of_field}{'(?<=[0-9])' if joined else ''}){_literal(literal)}"
+                )
+            before = name if joined else ""
         return re.compile(pattern).fullmatch
 
 
-def role_of(word: str, sommet: bool) -> str:
-    """Return the role that a word stands for; with `sommet`, S is a corner."""
-    word = word.casefold()
-    return "vertex" if sommet and word == "s" else ROLES[word]
+def _pattern_of_roles(own_words: Mapping[str, str]) -> tuple[str, str]:
+    """Return the pattern of the words for roles, and their characters."""
+    words = [word for word in {**ROLES, **own_words} if " " not in word]
+    pattern = "|".join(sorted(map(re.escape, words), key=len, reverse=True))
+    letters = re.escape("".join(sorted(set("".join(words)))))
+    return rf"(?i:{pattern})", letters + letters.upper()
 
 
-def is_bare(description: str) -> bool:
-    """Return whether a description only says that its point is a station or a control point."""
-    word = description.strip().casefold()
-    return word in CONTROL_WORDS or ROLES.get(word) == STATION
+def _fixed(name: str, width: int, numbered: bool) -> tuple[str, str]:
+    """Return the pattern of a field of so many characters, and its characters; a course may be a shorter word."""
+    if name == "number" or (name == "course" and not numbered):
+        return rf"[0-9]{{{width}}}", "0-9"
+    if name == "course":
+        return rf"(?:[0-9]{{{width}}}|[^\W\d_]{{1,{width}}}(?![^\W\d_]))", r"^\W_"
+    letters = _FIELDS[name][1]
+    return rf"[^\W_][{letters}]{{{width - 1}}}", letters
 
 
 def _named(found: "re.Match[str]") -> str:
@@ -253,23 +268,62 @@ def _is_sensible(text: str, rows: Sequence[CodeFields | None]) -> bool:
     if len(fields) < len(rows):
         return False
     corners = Counter(row.block for row in fields if row.role == "vertex")
-    if "{block}{role}" in text:  # the letter tells points from corners, and is no letter of the name
+    if "}{kind}" in text and not _end_in_kinds(fields):
+        return False
+    if "{course:2}" in text and not _are_counted(fields):
+        return False
+    if (
+        "{role?}" in text or "{block}{role}" in text
+    ):  # the letter tells points from corners, and is none of the name
         return any(row.role == "point" and corners[row.block] for row in fields)
     return "{role}" in text or max(corners.values(), default=0) >= _CORNERS
+
+
+def _end_in_kinds(fields: Sequence[CodeFields]) -> bool:
+    """Return whether the letters with which names end are kinds: one for each name, and few for many."""
+    kinds: dict[str, set[str | None]] = {}
+    for row in fields:
+        kinds.setdefault(row.block, set()).add(row.kind)
+    different = set[str | None]().union(*kinds.values())
+    return (
+        all(len(words) == 1 for words in kinds.values())
+        and 1 < len(different) <= len(kinds) / _STONES_OF_KIND
+    )
+
+
+def _are_counted(fields: Sequence[CodeFields]) -> bool:
+    """Return whether names are courses from the first or second, without a gap, and in each stones from the first."""
+    numbers: dict[int, set[int]] = {}
+    for row in fields:
+        if row.course is not None:
+            numbers.setdefault(row.course, set()).add(int(row.block[-2:]))
+    courses = sorted(numbers)
+    return (
+        bool(courses)
+        and courses == list(range(courses[0], courses[0] + len(courses)))
+        and courses[0] < 2
+        and all(min(stones) < 2 for stones in numbers.values())
+    )
 
 
 Fields = Mapping[str, tuple[str, str]]
 
 
-def _unclear(fields: Fields, names: Sequence[str], between: Sequence[str]) -> tuple[str, str, str]:
+def _unclear(
+    fields: Fields, names: Sequence[str], between: Sequence[str], fixed: Container[str]
+) -> tuple[str, str, str]:
     """Return two fields whose separation is not clear, and the text between them; empty if all are separated.
 
-    A field ends where the text after it has a character that the field cannot have; from the right likewise. If the
-    fields can be peeled off from both ends in this way until one is left, there is one reading.
+    A field ends where the text after it has a character that the field cannot have, or after its width; from the right
+    likewise. If the fields can be peeled off from both ends in this way until one is left, there is one reading.
     """
     names, between = list(names), list(between)
     while between:
-        if _ends(fields, names[0], between[0]) or _is_joined(names[0], between[0], names[1]):
+        if (
+            names[0] in fixed
+            or _ends(fields, names[0], between[0])
+            or _is_joined(names[0], between[0], names[1])
+        ):
             del names[0], between[0]
         elif _ends(fields, names[-1], between[-1]):
             del names[-1], between[-1]
@@ -278,8 +332,8 @@ def _unclear(fields: Fields, names: Sequence[str], between: Sequence[str]) -> tu
     return "", "", ""
 
 
-def _is_clear(fields: Fields, names: Sequence[str], between: Sequence[str]) -> bool:
-    return not _unclear(fields, names, between)[0]
+def _is_clear(fields: Fields, names: Sequence[str], between: Sequence[str], fixed: Container[str]) -> bool:
+    return not _unclear(fields, names, between, fixed)[0]
 
 
 def _ends(fields: Fields, field: str, literal: str) -> bool:
@@ -290,8 +344,8 @@ def _ends(fields: Fields, field: str, literal: str) -> bool:
 
 
 def _is_joined(field: str, literal: str, after: str) -> bool:
-    """Return whether a role follows a name at once; the digits end where its letters begin."""
-    return not literal and after == "role" and field in _JOINED
+    """Return whether a role or kind follows a name at once; the digits end where its letters begin."""
+    return not literal and after in ("role", "kind") and field in _JOINED
 
 
 def _literal(text: str) -> str:

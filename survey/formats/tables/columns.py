@@ -141,16 +141,18 @@ class Columns:
     at : place of each column that is known, from 0
     scales : unit [m] of those that state one
     notes : place and name of the columns that are kept as notes
+    joined : places of those that name a stone together, joined by hyphens in a further field; none: it has its own
     """
 
     count: int
     at: Mapping[str, int]
     scales: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[tuple[int, str], ...] = ()
+    joined: tuple[int, ...] = ()
 
 
 def read_map(text: str | None) -> ColumnMap:
-    """Read a map such as ``block=Stein,x=Rechts [m],ignore=Datum``.
+    """Read a map such as ``block=Stein,x=Rechts [m],ignore=Datum``; a name may be of several, ``block=Lage+Nr``.
 
     Raises
     ------
@@ -209,9 +211,7 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
     at: dict[str, int] = {}
     scales: dict[str, float] = {}
     free: list[int] = []
-    mine = {
-        what: _place(names, name, what, where, column_map.numbered) for what, name in column_map.names.items()
-    }
+    mine, joined = _mine(names, column_map, where)
     taken = set(mine.values())
     for what, k in mine.items():
         _take(what, k, names, at, scales, where)
@@ -219,6 +219,8 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
         if k in taken or not name or re.fullmatch(r"(?i)unnamed: \d+", name):
             continue
         kind = kind_of_column(name)
+        if k in joined and kind in (None, *_FALLBACK, *mine):
+            continue
         if {plain(name), plain(unit_of(name)[0])} & column_map.ignored or (
             kind is None and "*" in column_map.ignored
         ):
@@ -237,12 +239,27 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
     _check_missing(names, at, where)
     for k in free:
         _check_spelling(names[k], at, where)
-    return Columns(len(names), at, scales, tuple((k, names[k]) for k in sorted(free)))
+    return Columns(len(names), at, scales, tuple((k, names[k]) for k in sorted(free)), joined)
 
 
 def kind_of_column(name: str) -> str | None:
     """Return what a column of this name is; None if it is not known."""
     return _MEANINGS.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or _MEANINGS.get(plain(name))
+
+
+def _mine(names: Sequence[str], column_map: ColumnMap, where: str) -> tuple[dict[str, int], tuple[int, ...]]:
+    """Return the places of columns that the user gives, and of those that name a stone together, in a further field."""
+    columns = column_map.names.get("block", "").split("+")
+    joined: tuple[int, ...] = ()
+    if len(columns) > 1 and column_map.names["block"] not in names:
+        joined = tuple(_place(names, name, "block", where, column_map.numbered) for name in columns)
+    mine = {
+        what: len(names)
+        if what == "block" and joined
+        else _place(names, name, what, where, column_map.numbered)
+        for what, name in column_map.names.items()
+    }
+    return mine, joined
 
 
 def _place(names: Sequence[str], name: str, what: str, where: str, numbered: bool) -> int:

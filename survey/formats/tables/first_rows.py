@@ -10,17 +10,19 @@ from ground.errors import SurveyError
 from ground.tables.columns import UNITS, length_unit
 from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import ListRows, TextRows
-from survey.formats.tables.code_template import ROLES, CodeTemplate
+from survey.formats.tables.code_template import CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, kind_of_column
 from survey.formats.tables.point_table import TableStone
+from survey.formats.tables.roles import CONTROL, ROLES, STATION, role_of, roles_with
 
-__all__ = ["check_names", "check_stones_repeat", "note_key", "with_role", "with_units"]
+__all__ = ["are_headed", "check_names", "check_stones_repeat", "note_key", "with_role", "with_units"]
 
 AnyRows = TextRows | ListRows
 
 _ROLE_WORDS = frozenset(
     role for role in ROLES if len(role) > 1 or role in "vp"
 )  # other letters may number points
+_OF_STONES = {"vertex", "point", STATION, CONTROL}
 _FEWEST = 4  # rows from which a table of a stone for each row is one of points without stones
 _REPEATS = 3  # rows of a stone, at least
 _NO_CODE = "{block}:{role}:{kind}"  # a template beside which all usual ones are tried
@@ -28,11 +30,17 @@ _ADVISED = re.compile(r'--codes "[^"]*"')
 
 
 def with_role(
-    rows: AnyRows, ahead: Sequence[tuple[int, Any]], names: Sequence[str], column_map: ColumnMap, codes: bool
+    rows: AnyRows,
+    ahead: Sequence[tuple[int, Any]],
+    names: Sequence[str],
+    column_map: ColumnMap,
+    codes: bool,
+    own_words: Mapping[str, str],
 ) -> ColumnMap:
     """Return the map of the columns with the one whose values are all roles of points as the role.
 
-    It may have any name, also one of kinds, numbers or names of points.
+    It may have any name, also one of kinds, numbers or names of points. Words of one letter, which may number points,
+    and numbered words are roles where there are some of corners and some of points on faces: E1, E2, E3, M.
     """
     known = [kind_of_column(name) if name else "" for name in names]
     if "role" in (*known, *column_map.names) or column_map.numbered or (codes and "description" in known):
@@ -48,7 +56,16 @@ def with_role(
             for k in free:
                 word = values[k].casefold() if k < len(values) else ""
                 words[k] |= {word} if word or i else set()  # the first row may hold units
-    roles = [k for k in free if words[k] and words[k] <= _ROLE_WORDS]
+    known_roles = roles_with(own_words)
+    roles = [
+        k
+        for k in free
+        if words[k]
+        and (
+            words[k] <= _ROLE_WORDS | own_words.keys()
+            or {"vertex", "point"} <= {role_of(word, known_roles) for word in words[k]} <= _OF_STONES
+        )
+    ]
     if len(roles) != 1:
         return column_map
     return replace(column_map, names={**column_map.names, "role": names[roles[0]]})
@@ -70,6 +87,19 @@ def with_units(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns
     return 1, replace(
         columns, scales={**columns.scales, **{k: UNITS[unit] for k, unit in stated.items() if unit}}
     )
+
+
+def are_headed(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns) -> bool:
+    """Return whether the name of a stone stands in the first of its rows alone: most rows have none."""
+    named: list[bool] = []
+    if columns.joined or not {"block", *"xyz"} <= columns.at.keys() or "description" in columns.at:
+        return False
+    for number, row in ahead:
+        with suppress(SurveyError):  # told when the row is read
+            values = [*rows.cells(row, number), *[""] * columns.count]
+            if all(values[columns.at[axis]] for axis in "xyz"):
+                named.append(bool(values[columns.at["block"]]))
+    return bool(named) and named[0] and _REPEATS * sum(named) <= len(named)
 
 
 def _unit(text: str) -> str | None:
@@ -109,7 +139,7 @@ def check_stones_repeat(
         if not all(texts):
             continue
         advice = _ADVISED.search(CodeTemplate(_NO_CODE).expected(texts[0], texts[1:]))
-        if advice is not None and "{role}" in advice[0]:
+        if advice is not None and "{role" in advice[0]:
             remedy = f'if {shown(name)} holds codes, give --columns "{before}description={name}" {advice[0]}'
             break
         if len(texts) >= _REPEATS * len(set(texts)) > _REPEATS:
@@ -138,8 +168,9 @@ def check_names(path: str, title: str, stones: Mapping[str, TableStone]) -> None
     names = [stone.name for stone in stones.values() if stone.name]
     if len(names) < _FEWEST:
         return
-    advice = _ADVISED.search(CodeTemplate(_NO_CODE).expected(names[0], names[1:]))
-    if advice is None or "{role}" not in advice[0]:
+    expected = CodeTemplate(_NO_CODE).expected(names[0], names[1:])
+    advice = _ADVISED.search(expected)
+    if advice is None or "{role" not in advice[0]:
         return
     template = CodeTemplate(advice[0].removeprefix('--codes "').removesuffix('"'))
     roles: dict[str, set[str]] = {}
@@ -147,7 +178,7 @@ def check_names(path: str, title: str, stones: Mapping[str, TableStone]) -> None
         roles.setdefault(fields.block, set()).add(fields.role)
     if any({"vertex", "point"} <= one for one in roles.values()):
         what = f"column {shown(title)} holds codes of stones and roles, such as {shown(names[0])}"
-        raise SurveyError(what, where=path, remedy=f"give {advice[0]}")
+        raise SurveyError(what, where=path, remedy=f"give {expected[advice.start() :]}")
 
 
 def note_key(name: str) -> str:

@@ -8,7 +8,7 @@ of a stone may lie anywhere. Empty fields mean "not known".
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from operator import itemgetter
@@ -32,19 +32,19 @@ from survey.formats.tables.axes import (
     other_order,
     outlines_of,
 )
-from survey.formats.tables.code_template import (
-    CONTROL_WORDS,
-    ROLES,
-    STATION,
-    CodeFields,
-    CodeTemplate,
-    is_bare,
-    role_of,
-)
+from survey.formats.tables.code_template import CodeFields, CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, find_columns, kind_of_column, read_map
-from survey.formats.tables.first_rows import check_names, check_stones_repeat, note_key, with_role, with_units
+from survey.formats.tables.first_rows import (
+    are_headed,
+    check_names,
+    check_stones_repeat,
+    note_key,
+    with_role,
+    with_units,
+)
 from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
+from survey.formats.tables.roles import CONTROL, STATION, is_bare, role_of, roles_with
 from survey.formats.tables.wkt import outline_of
 from survey.records.survey import DEPTH_ORIGINS, Station, Survey, SurveyHead, SurveyStream
 
@@ -53,6 +53,7 @@ __all__ = [
     "NEEDED",
     "OPTIONAL",
     "PointCollector",
+    "is_table",
     "open_csv",
     "open_penzd",
     "open_pnezd",
@@ -72,8 +73,6 @@ OPTIONAL = (
     *("name", "description", "outline"),
 )
 """Optional columns."""
-
-_CONTROL = "control"  # role of a control point
 
 _OF_STONES = ("depth", "depth_sigma", "depth_source", "depth_origin", "zone", "station")
 _IDENTITY = ("block", "kind", "course", "role", "description")
@@ -120,10 +119,25 @@ def open_table(path: Path, rows: AnyRows, options: ReadingOptions) -> SurveyStre
     iterator = iter(rows)
     ahead = list(islice(iterator, _LOOK_AHEAD))
     column_map = read_map(options.columns)
-    header, columns = _find_header(rows, ahead, column_map, options.codes is not None)
+    header, columns = _find_header(rows, ahead, column_map, options)
     units, columns = with_units(rows, ahead[header:], columns)
+    headed = are_headed(rows, ahead[header + units :], columns)
     data = chain(ahead[header + units :], iterator)
-    return _read(path, rows, data, columns, options, titles=ahead[:header])
+    return _read(path, rows, data, columns, options, titles=ahead[:header], headed=headed)
+
+
+def is_table(path: Path) -> bool:
+    """Return whether the first lines of a text name columns of points of stones, and say which is easting."""
+    try:
+        rows = open_rows(path)
+        ahead = list(islice(iter(rows), _LOOK_AHEAD))
+        header, columns = _find_header(rows, ahead, ColumnMap(), ReadingOptions())
+        row: Any
+        number, row = ahead[header - 1]
+        names = rows.cells(row, number)
+    except SurveyError:
+        return False
+    return "outline" in columns.at or {plain(names[columns.at[axis]]) for axis in "xy"}.isdisjoint("xy")
 
 
 def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
@@ -163,7 +177,7 @@ def _by_roles(opened: Callable[[ReadingOptions], SurveyStream], options: Reading
     try:
         return opened(options)
     except _SommetError:
-        stream = opened(replace(options, sommet=True))
+        stream = opened(replace(options, roles={**options.roles, "s": "vertex"}))
         remark = "role S is read as a corner (sommet), as no station stands at three places"
         return replace(stream, remarks=(*stream.remarks, remark))
 
@@ -211,8 +225,9 @@ def _read(
     options: ReadingOptions,
     form: str = "",
     titles: Sequence[tuple[int, Any]] = (),
+    headed: bool = False,
 ) -> SurveyStream:
-    reader = _RowReader(path, rows, columns, options, form)
+    reader = _RowReader(path, rows, columns, options, form, headed)
     first = 0
     for number, row in data:
         first = first or number
@@ -222,8 +237,10 @@ def _read(
     if not first:
         what = "list has no points" if form else "table has no points"
         raise rows.fail(rows.end, f"the {what}", "add one line per point")
+    names = rows.cells(titles[-1][1], titles[-1][0]) if titles and not form else ()
+    if not form and {"block", "course"} <= columns.at.keys() and not columns.joined:
+        _check_numbers(rows.path, columns, names, collector.table.stones)
     if not form and "block" in columns.at and "outline" not in columns.at:
-        names = rows.cells(titles[-1][1], titles[-1][0]) if titles else ()
         check_stones_repeat(rows.path, columns, names, collector.table.stones, options.columns)
         at = columns.at["block"]
         title = names[at] if at < len(names) else str(at + 1)
@@ -235,11 +252,26 @@ def _read(
     return SurveyStream(head, collector.table.records(), header=first - 1, remarks=remarks)
 
 
+def _check_numbers(
+    path: str, columns: Columns, names: Sequence[str], stones: Mapping[str, TableStone]
+) -> None:
+    """Refuse a table whose stones are numbered anew in each course."""
+    shared = sum(isinstance(stone.error, _AnotherCourseError) for stone in stones.values())
+    if 2 * shared <= len(stones):
+        return
+    both = [names[columns.at[what]] if names else str(columns.at[what] + 1) for what in ("course", "block")]
+    raise SurveyError(
+        "most numbers of stones stand in several courses: they are numbered anew in each",
+        where=path,
+        remedy=f'name stones by both: --columns "block={"+".join(both)}"',
+    )
+
+
 def _find_header(
-    rows: AnyRows, ahead: Sequence[tuple[int, Any]], column_map: ColumnMap, codes: bool
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], column_map: ColumnMap, options: ReadingOptions
 ) -> tuple[int, Columns]:
     """Return the number of rows up to the names of the columns, and the columns; sets the separator."""
-    stated = rows.delimiter
+    stated, codes = rows.delimiter, options.codes is not None
     best: tuple[int, SurveyError] | None = None
     for k, (number, row) in enumerate(ahead[:_TITLES]):
         rows.delimiter = stated
@@ -249,8 +281,10 @@ def _find_header(
                 names = rows.cells(row, number)
                 recognised = sum(kind_of_column(name) is not None for name in names if name)
                 where = f"{rows.path}:{number}" if number else rows.path
-                told = with_role(rows, ahead[k + 1 :], names, column_map, codes) if recognised else column_map
-                columns = find_columns(names, told, where, codes)
+                map_with_role = column_map
+                if recognised:
+                    map_with_role = with_role(rows, ahead[k + 1 :], names, column_map, codes, options.roles)
+                columns = find_columns(names, map_with_role, where, codes)
             except SurveyError as error:
                 if best is None or recognised > best[0]:
                     best = recognised, error
@@ -424,11 +458,13 @@ class PointCollector:
     ----------
     table : the stones
     template : of the descriptions
+    roles : of points by the words for them
     """
 
     def __init__(self, path: Path, options: ReadingOptions, unique: bool) -> None:
         self._path, self._options, self._unique = str(path), options, unique
-        self.template = CodeTemplate(options.codes or CODES, options.sommet)
+        self.roles = roles_with(options.roles)
+        self.template = CodeTemplate(options.codes or CODES, options.roles)
         self.table = PointTable(str(path), options.sigma, options.kind)
         self._head = options.head_for(path)
         self._known = {station.name: station for station in self._head.stations}
@@ -487,10 +523,11 @@ class PointCollector:
             if code_fields.role != STATION:
                 self._misfits = None
             return code_fields
-        if name and is_bare(description):
-            role = _CONTROL if description.strip().casefold() in CONTROL_WORDS else STATION
-            return CodeFields(name, None, None, None, role)
+        if name and is_bare(description, self.roles):
+            return CodeFields(name, None, None, None, self.roles[description.strip().casefold()])
         remedy = "correct it, or give the code template that the list was made with: --codes"
+        if not any(map(str.isdigit, description)):
+            remedy += f'; if it is no stone, --roles "{description.strip()[:20]}={CONTROL}"'
         if self._misfits is not None:
             if not self._misfits:
                 remedy = self.template.expected(description, ())
@@ -530,7 +567,7 @@ class PointCollector:
             if KIND.fullmatch(kind_word) is None:
                 raise self.fail(
                     line, f"kind {shown(kind)} is not a kind name",
-                    f'write e.g. header, or say what it stands for: --kinds "{kind[:20]}=header"',
+                    f'write e.g. header, or say what it stands for: --kinds "{kind[:40]}=ashlar"',
                 )  # fmt: skip
         return _Identity(code, block, kind_word, course, zone, role)
 
@@ -564,11 +601,14 @@ class PointCollector:
             if new is not None and old is None:
                 setattr(stone, name, new)
             elif new is not None and new != old:
-                raise self.fail(
+                error = self.fail(
                     line,
                     f"kind, course or zone of block {identity.code} differs from line {stone.line}",
                     "give every line of a block the same kind and course",
                 )
+                if identity.course not in (None, stone.course):
+                    raise _AnotherCourseError(error.what, where=error.where, remedy=error.remedy)
+                raise error
         stone.agreed = identity
         return stone
 
@@ -592,7 +632,7 @@ class PointCollector:
             if np.array_equal(before.position, place):
                 return  # a list names its station at every setup
             corners = any(stone.vertices for stone in self.table.stones.values())
-            if name in self._moved and not corners and not self._options.sommet:
+            if name in self._moved and not corners and self.roles["s"] == STATION:
                 what = f"station {name} stands at three places: role S, or station, is a corner?"
                 raise _SommetError(what, where=f"{self._path}:{line}", remedy="write v for a corner")
             self._moved.add(name)
@@ -614,7 +654,7 @@ class PointCollector:
         code: str | None = None
         try:
             fields = self.fields(description, line, name)
-            if fields.role == _CONTROL:
+            if fields.role == CONTROL:
                 self.leave_out(description)
                 return
             identity = self.identity(fields.block, fields.kind, fields.course, fields.zone, fields.role, line)
@@ -647,11 +687,21 @@ class _SommetError(_WrongTemplateError):
     """A role that stands for a station is that of corners."""
 
 
+class _AnotherCourseError(SurveyError):
+    """A stone is in two courses."""
+
+
 class _RowReader:
-    """Reader of the rows of a table."""
+    """Reader of the rows of a table; in one that is `headed`, the name of a stone holds for the rows below it."""
 
     def __init__(
-        self, path: Path, rows: AnyRows, columns: Columns, options: ReadingOptions, form: str
+        self,
+        path: Path,
+        rows: AnyRows,
+        columns: Columns,
+        options: ReadingOptions,
+        form: str,
+        headed: bool,
     ) -> None:
         self._rows, self._path, self._fail = rows, rows.path, rows.fail
         self._columns, self._options, self._limit = columns, options, 5 if form else 0
@@ -680,6 +730,9 @@ class _RowReader:
         if columns.notes:
             notes = ", ".join(name[:40] for _, name in columns.notes)
             self.remarks = (f'kept as notes: {notes}; --columns "ignore=…" leaves columns out',)
+        self._name_of_rows = "" if headed else None
+        if headed:
+            self.remarks += ("rows without the name of a stone are of the stone above them",)
 
     def take(self, row: Any, number: int) -> None:
         """Read one row."""
@@ -688,16 +741,24 @@ class _RowReader:
             values = self._rows.cells(row, number, self._limit)
             if len(values) != self._count:
                 self._fit(values, number)
+            if self._columns.joined:
+                values.append("-".join(values[k] for k in self._columns.joined if values[k]))
+            elif self._name_of_rows is not None:
+                at = self._columns.at["block"]
+                self._name_of_rows = values[at] = values[at] or self._name_of_rows
             key = self._pick(values)
             identity = self._known.get(key)
             if identity is None:
                 identity = self._identified(values, number)
                 if len(self._known) >= _CACHED:
                     self._known.clear()
-                if "description" not in self._columns.at or not is_bare(self._description(values)):
+                if "description" not in self._columns.at or not is_bare(
+                    self._description(values), self.collector.roles
+                ):
                     self._known[key] = identity
-            if identity.role == _CONTROL:
-                self.collector.leave_out(self._description(values))
+            if identity.role == CONTROL:
+                word = self._columns.at.get("description", self._columns.at.get("role", 0))
+                self.collector.leave_out(values[word])
                 return
             stone = self._table.stones.get(identity.code)
             if stone is not None and stone.error is not None and identity.role != STATION:
@@ -738,12 +799,16 @@ class _RowReader:
         if cells.get("course"):
             course = parse_course(cells["course"], f"{self._path}:{number}")
         if "role" in cells:
-            text = cells["role"].casefold()
-            if text not in ROLES:
+            stated = role_of(cells["role"], self.collector.roles)
+            if stated is None:
+                word = cells["role"].rstrip("0123456789")[:20] or "…"
                 raise self._fail(
-                    number, f"role {shown(cells['role'])}", "write vertex (v) or point (p), or station (s)"
+                    number,
+                    f"role {shown(cells['role'])}",
+                    f"write vertex (v) or point (p), or station (s); or say what it stands for: --roles "
+                    f'"{word}=point"',
                 )
-            role = role_of(text, self._options.sommet)
+            role = stated
         return self.collector.identity(block, kind, course, zone, role, number)
 
     def _add(self, identity: _Identity, values: Sequence[str], number: int, count: int) -> None:

@@ -4,10 +4,12 @@ import re
 
 import pytest
 
-from ground.errors import SurveyError
+from ground.errors import SurveyError, UsageError
 from survey.formats.options import ReadingOptions
+from survey.formats.reading import format_of
 from survey.formats.tables.reader import open_csv, open_penzd
-from survey.records.survey import BlockRecord
+from survey.formats.tables.roles import read_roles
+from survey.records.survey import BlockRecord, Reject
 from tests.survey.formats.workbooks import xlsx
 
 PLACES = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.3), (0.0, 0.3), (0.2, 0.1), (0.3, 0.2)]
@@ -26,8 +28,8 @@ def read(path, **options):
     return {one.code: (len(one.vertices), len(one.points), one.kind) for one in records}
 
 
-def table(path, names, cells):
-    path.write_text("\n".join(";".join(row) for row in [names, *cells]), encoding="cp1252")
+def table(path, names, cells, encoding="cp1252"):
+    path.write_text("\n".join(";".join(row) for row in [names, *cells]), encoding=encoding)
     return path
 
 
@@ -169,3 +171,147 @@ def test_letters_that_are_of_the_names_are_no_roles(tmp_path):
     path.write_text("\n".join(rows))
     with pytest.raises(SurveyError, match=r'--codes "\{block\}"'):
         open_penzd(path)
+
+
+@pytest.mark.parametrize("mark", ["'", "’", " ", "\u00a0", "\u202f"])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_thousands_may_be_set_apart(tmp_path, mark, decimal):
+    def written(value):
+        return f"{value:,.3f}".replace(".", "#").replace(",", mark).replace("#", decimal)
+
+    cells = [
+        [str(k), *map(written, (2683401 + x, 1248077 + y, z)), f"{code}:{role}"]
+        for k, (code, role, x, y, z) in enumerate(POINTS, 1)
+    ]
+    path = table(tmp_path / "a.csv", ["Nr", "Ost", "Nord", "H", "Code"], cells, "utf-8")
+    stones = list(open_penzd(path).blocks)
+    assert stones[0].vertices[1].tolist() == pytest.approx([2683402.1, 1248077.001, 0.35], abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["1.234,5", "12 345", "1'23", "1'2345", "1’234'567"])
+def test_what_may_be_two_numbers_or_none_is_refused(tmp_path, text):
+    cells = [[code, role, text, str(y), str(z)] for code, role, _, y, z in POINTS]
+    found = list(open_csv(table(tmp_path / "a.csv", ["Stein", "Rolle", "x", "y", "z"], cells)).blocks)
+    assert all(isinstance(one, Reject) and text in one.error.what for one in found)
+
+
+KIND_LETTERS = {("01", 1): "E", ("01", 2): "L", ("02", 1): "E", ("02", 2): "L"}
+
+
+@pytest.mark.parametrize("on_face", ["Fl", "m", "Fläche"])
+@pytest.mark.parametrize(
+    ("width", "template"), [(2, "{course:2}{number:2}{kind} {role?}"), (1, "{block}{kind} {role?}")]
+)
+def test_codes_without_marks_are_read_as_the_message_says(tmp_path, on_face, width, template):
+    rows = [f"H{k},{k},7,2,HP" for k in range(3)]
+    for k, (code, role, x, y, z) in enumerate(POINTS):
+        course, number = code.split("-")
+        name = f"{course}{int(number):0{width}d}{KIND_LETTERS[course, int(number)]}"
+        rows.append(f"{k},{x},{y},{z},{name}{f' {on_face}' if role == 'F' else ''}")
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(rows))
+    with pytest.raises(SurveyError) as refused:
+        open_penzd(path)
+    codes, roles = re.findall(r'--(?:codes|roles) "([^"]*)"', str(refused.value))
+    assert (codes, roles) == (template, "HP=control")
+    options = ReadingOptions(codes=codes, roles=read_roles(roles), kinds={"e": "quoin", "l": "stretcher"})
+    stream = open_penzd(path, options)
+    stones = list(stream.blocks)
+    assert [(len(one.vertices), len(one.points), one.kind) for one in stones] == [
+        (4, 2, kind) for kind in ("quoin", "stretcher") * 2
+    ]
+    assert {one.course for one in stones} == ({1, 2} if width == 2 else {None})
+    assert "left out: 3 HP" in stream.remarks[0]
+
+
+def test_letters_that_tell_stones_of_one_number_apart_are_no_kinds(tmp_path):
+    rows = [
+        f"{k}{letter},{x + 5 * (letter == 'b')},{y},{z},{code}{letter}"
+        for letter in "ab"
+        for k, (code, _, x, y, z) in enumerate(POINTS)
+    ]
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(rows))
+    with pytest.raises(SurveyError, match=r'--codes "\{block\}"'):
+        open_penzd(path)
+
+
+@pytest.mark.parametrize(
+    "words", [("E1 E2 E3 E4 M1 M2"), ("Ecke 1,Ecke 2,Ecke 3,Ecke 4,Mitte,Mitte"), ("v1 v2 v3 v4 p p")]
+)
+def test_corners_and_middles_that_are_numbered_are_roles(tmp_path, words):
+    names = words.split("," if "," in words else None)
+    cells = [[code, names[k % 6], *map(str, place)] for k, (code, _, *place) in enumerate(POINTS)]
+    found = read(table(tmp_path / "a.csv", ["Stein", "Pkt", "x", "y", "z"], cells))
+    assert {code: one[:2] for code, one in found.items()} == FACES
+    # names of points that say nothing of roles are names
+    cells = [
+        [code, f"P{k}", *map(str, place)] for k, (code, role, *place) in enumerate(POINTS) if role == "E"
+    ]
+    assert set(read(table(tmp_path / "b.csv", ["Stein", "Pkt", "x", "y", "z"], cells)).values()) == {
+        (4, 0, "ashlar")
+    }
+
+
+def test_words_for_roles_are_stated_as_the_message_says(tmp_path):
+    word = {"E": "Kante", "F": "innen 3"}
+    cells = [[code, word[role], *map(str, place)] for code, role, *place in POINTS]
+    path = table(tmp_path / "a.csv", ["Stein", "Rolle", "x", "y", "z"], cells)
+    (first, *_) = open_csv(path).blocks
+    assert '--roles "Kante=point"' in str(first.error)
+    roles = read_roles("Kante=vertex,innen=Fläche")
+    assert {code: one[:2] for code, one in read(path, roles=roles).items()} == FACES
+    with pytest.raises(UsageError, match="roles are vertex, point, station and control"):
+        read_roles("Kante=Rand,innen=drinnen")
+
+
+@pytest.mark.parametrize("workbook", [False, True])
+def test_the_name_of_a_stone_holds_for_the_rows_below_it(tmp_path, workbook):
+    cells = [
+        [
+            *([code, code[1]] if k % 6 == 0 else ["", ""]),
+            "Ecke" if role == "E" else "Fläche",
+            *map(str, place),
+        ]
+        for k, (code, role, *place) in enumerate(POINTS)
+    ]
+    names = ["Stein", "Lage", "Typ", "x", "y", "z"]
+    path = table(tmp_path / "a.csv", names, cells)
+    if workbook:
+        path = tmp_path / "a.xlsx"
+        path.write_bytes(xlsx({"Messung": [names, *cells]}))
+    stream = open_csv(path)
+    stones = list(stream.blocks)
+    assert {one.code: (len(one.vertices), len(one.points)) for one in stones} == FACES
+    assert {one.code: one.course for one in stones} == {code: int(code[1]) for code in FACES}
+    assert any("of the stone above" in remark for remark in stream.remarks)
+
+
+def test_a_name_that_is_missing_once_is_an_error(tmp_path):
+    cells = [[code, role, *map(str, place)] for code, role, *place in POINTS]
+    cells[2][0] = ""
+    found = list(open_csv(table(tmp_path / "a.csv", ["Stein", "Rolle", "x", "y", "z"], cells)).blocks)
+    assert sum(isinstance(one, Reject) for one in found) == 1
+
+
+@pytest.mark.parametrize("names", [("Lage", "Nr"), ("course", "block"), ("assise", "n° pierre")])
+def test_numbers_that_begin_anew_in_each_course_are_joined_as_the_message_says(tmp_path, names):
+    cells = [[*map(str, map(int, code.split("-"))), role, *map(str, place)] for code, role, *place in POINTS]
+    path = table(tmp_path / "a.csv", [*names, "role", "x", "y", "z"], cells)
+    with pytest.raises(SurveyError, match="numbered anew") as refused:
+        open_csv(path)
+    (columns,) = re.findall(r'--columns "([^"]*)"', str(refused.value))
+    assert columns == f"block={names[0]}+{names[1]}"
+    stones = list(open_csv(path, ReadingOptions(columns=columns)).blocks)
+    assert {one.code: one.course for one in stones} == {"1-1": 1, "1-2": 1, "2-1": 2, "2-2": 2}
+    assert all((len(one.vertices), len(one.points)) == (4, 2) for one in stones)
+
+
+@pytest.mark.parametrize("ending", [".txt", ".asc", ".prn"])
+def test_a_text_with_clear_names_of_columns_needs_no_format(tmp_path, ending):
+    cells = [[code, role, *map(str, place)] for code, role, *place in POINTS]
+    path = table(tmp_path / f"a{ending}", ["Stein", "Rolle", "Ost", "Nord", "Höhe"], cells)
+    assert format_of(path) == "csv"
+    unclear = table(tmp_path / f"b{ending}", ["Stein", "Rolle", "x", "y", "z"], cells)
+    with pytest.raises(UsageError, match="does not tell the format"):
+        format_of(unclear)
