@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -16,7 +17,7 @@ from archmodel.store.bulk import first_free_id
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity, kind_named, kinds
-from ground.errors import NoDatabaseError, SurveyError, UsageError
+from ground.errors import MomaError, NoDatabaseError, SurveyError, UsageError
 from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.ingest.kind_rules import KindRule, apply_rules, check_kinds
 from pipelines.ingest.outlined import (
@@ -212,7 +213,7 @@ def _measure(
     keep_going: bool,
     progress: Listener,
 ) -> Tally:
-    """Write the good stones of one file into a spool; raise at the first bad one, or keep it for the rejects."""
+    """Write the good stones of one file into a spool; keep bad ones for the rejects, or refuse the file for them."""
     path = source.path
     stream = survey_stones(open_source(source, format, options, progress))
     tally = Tally(path, stream, read_files(source, options), options or ReadingOptions())
@@ -227,10 +228,10 @@ def _measure(
             tally.count(made)
             spool.append(stone_record(made))
             progress(Progress(stage, tally.stones.total(), None, made.code))
-        elif keep_going:
-            tally.refused.append(made)
         else:
-            raise made.error
+            tally.refused.append(made)
+    if tally.refused and not keep_going:
+        raise _first_error(tally.refused, tally.stones.total())
     if not tally.stones:
         first = f"; the first: {tally.refused[0].error}" if tally.refused else ""
         what = f"none of its {len(tally.refused)} stones can be ingested{first}"
@@ -238,6 +239,24 @@ def _measure(
     if format != "moma" and (question := next(tally.questions(), None)) is not None:
         raise SurveyError(question.what, where=str(path), remedy=question.remedy)
     return tally
+
+
+def _first_error(refused: Sequence[Reject], good: int) -> MomaError:
+    """Return the error of the first stone that is wrong, with the number of the others, and one of another kind."""
+    first, *others = (reject.error for reject in refused)
+    if not others or not good:
+        return first
+    pattern = _pattern(first.what)
+    another = next((error for error in others if _pattern(error.what) != pattern), None)
+    also = "" if another is None else f", as {another.where}: {another.what}"
+    count = f"{len(others)} more of {good + len(refused)} stones are wrong{also}"
+    remedy = f"{first.remedy}; {count}; --keep-going takes the rest"
+    return type(first)(first.what, where=first.where, remedy=remedy)
+
+
+def _pattern(text: str) -> str:
+    """Return what is alike in errors of one kind: the text without what is quoted, and without names and numbers."""
+    return re.sub(r"'[^']*'|\S*\d\S*", "", text)
 
 
 def _store(session: Session, tally: Tally, stones: Iterator[StoneRecord], again: bool) -> None:

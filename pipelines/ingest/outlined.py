@@ -142,7 +142,7 @@ def cloud_options(
 
     Parameters
     ----------
-    base : options of all formats; its sigma is that of a single point
+    base : options of all formats; its sigma is that of a single point, its unit that of the outlines
     outlines : file of outlines
     wall : file of a frame, or two points on the foot of a wall
     layer : of a file of outlines with several
@@ -166,6 +166,7 @@ def cloud_options(
         wall=None if wall is None else read_wall(wall),
         layer=layer,
         chosen=field_map(chosen),
+        outline_unit=base.unit,
         outline_sigma=outline_sigma or default.outline_sigma,
         margin=margin,
         slab=slab or default.slab,

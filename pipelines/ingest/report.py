@@ -13,7 +13,7 @@ from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.geometry.convexity import is_convex
-from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side
+from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side, question_of_unit
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject
@@ -142,7 +142,7 @@ class Tally:
     decimals: int = 0
     changed: dict[str, tuple[str, ...]] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
-    units: Counter[str] = field(default_factory=Counter)
+    lengths: list[float] = field(default_factory=list)
     boxes: list[Array] = field(default_factory=list)
     centres: list[Array] = field(default_factory=list)
 
@@ -159,9 +159,9 @@ class Tally:
             self._count_solid(block)
         elif face.remarks:
             self.changed[block.code] = face.remarks
-        if (doubt := doubt_of(float(np.ptp(block.solid.vertices, axis=0).max()), LENGTH)) is not None:
+        self.lengths.append(float(np.ptp(block.solid.vertices, axis=0).max()))
+        if (doubt := doubt_of(self.lengths[-1], LENGTH)) is not None:
             self.doubts[block.code] = doubt.text
-            self.units[doubt.option] += 1
         if face.provenance.source == "points" and face.fit.rms >= self.rms:
             self.rms, self.worst = face.fit.rms, block.code
 
@@ -215,11 +215,9 @@ class Tally:
 
     def questions(self) -> Iterator[Question]:
         """Ask for the unit if most stones are of an impossible size, and for the axis if they lie on their side."""
-        (unit, count), *_ = [*self.units.most_common(1), ("", 0)]
-        total = self.stones.total()
-        if unit and 2 * count > total and self.options.unit is None:
-            what = f"{count} of {total} stones have the size of stones in {unit}, not metres"
-            yield Question(what, f"give --unit {unit}, or --unit m if they are that large")
+        question = question_of_unit(self.lengths, "stones") if self.options.unit is None else None
+        if question is not None:
+            yield Question(*question)
         if self.boxes and self.options.up is None and lies_on_its_side(np.array(self.boxes)):
             what = "few stones stand on others along z, but some do along y"
             yield Question(what, "give --up y if y points upwards, or --up z if they lie as they should")

@@ -22,12 +22,14 @@ from survey.clouds._kernels.planes import COVERED, FEW, FINE, Rules, fit_patches
 from survey.clouds.collecting import Collected, collect_points
 from survey.clouds.outlines.reading import Drawing, read_outlines
 from survey.clouds.placing import PlacedOutline, facing_station, place_outlines
+from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.reading import open_points
 from survey.clouds.review import drawn_doubts, measured_doubts
 from survey.clouds.settings import CloudOptions
 from survey.clouds.wall import Wall
 from survey.formats.fields import CODE
 from survey.geometry.solids import area_vector
+from survey.quality.plausible import question_of_unit
 from survey.records.review import Doubtful
 from survey.records.survey import OBSERVER, BlockRecord, Reject, Station, SurveyHead, SurveyStream
 
@@ -74,6 +76,7 @@ def open_cloud(
         chosen=options.chosen,
         sigma=options.outline_sigma,
         smooth=options.smooth,
+        unit=options.outline_unit,
         kinds=options.kinds,
         keep_going=True,
     )
@@ -84,13 +87,15 @@ def open_cloud(
     head = options.head_for(options.outlines)
     stations = head.stations or tuple(station for cloud in clouds for station in cloud.stations)
     placed = place_outlines(drawing.outlines, options.wall, stations)
+    if options.outline_unit is None:
+        _check_unit(placed, options.outlines)
     if options.wall is None and stations:
         _check_sides(placed, stations, bool(head.stations), options.outlines)
     sigmas = np.array([_outline_sigma(one, drawing, options) for one in placed])
     margins = _margins(placed, sigmas, options.margin)
     collected = collect_points(clouds, placed, margins, options.slab, progress)
     if not collected.inside:
-        raise _apart(clouds[0].near, placed, collected, options)
+        raise _apart(clouds, placed, collected, options)
     head = _seen(head, stations, placed, options.wall)
     doubts = [warning for cloud in clouds for warning in cloud.warnings]
     review = [Doubtful("", "precision", text, str(files[0])) for text in doubts]
@@ -149,14 +154,42 @@ def _size(outline: PlacedOutline) -> float:
     return float(np.ptp(outline.ring, axis=0).max())
 
 
+def _check_unit(placed: Sequence[PlacedOutline], path: Path) -> None:
+    """Ask for the unit of outlines most of which have the size of stones in another one."""
+    question = question_of_unit([_size(outline) for outline in placed], "outlines")
+    if question is not None:
+        raise SurveyError(question[0], where=str(path), remedy=question[1])
+
+
 def _apart(
-    near: Array, placed: Sequence[PlacedOutline], collected: Collected, options: CloudOptions
+    clouds: Sequence[PointCloud],
+    placed: Sequence[PlacedOutline],
+    collected: Collected,
+    options: CloudOptions,
 ) -> SurveyError:
+    """Make the error of outlines in which no point lies, with the places of both."""
+    near = clouds[0].near
     middle = np.mean([one.origin for one in placed], axis=0)
-    where = f"about ({', '.join(f'{one:.2f}' for one in middle)})"
-    cloud = f"about ({', '.join(f'{one:.2f}' for one in near)})"
-    what = f"none of its {collected.read} points lies in an outline: outlines lie {where}, the cloud {cloud}"
+    none = f"none of its {collected.read} points lies in an outline"
+    what = f"{none}: outlines lie about {_shown(middle)}, the cloud about {_shown(near)}"
     remedy = f"check --wall, the world file and units; points count up to {options.slab:g} m from the plane (--slab)"
+    if (wall := options.wall) is not None:
+        drawn = np.concatenate([(outline.corners - wall.origin) @ wall.axes.T for outline in placed])
+        places = (
+            (chunk.places - (wall.origin - near)) @ wall.axes.T
+            for cloud in clouds
+            for chunk in cloud.chunks(near, False)
+        )
+        ends = np.array([(piece.min(axis=0), piece.max(axis=0)) for piece in places if len(piece)])
+        low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+        what = (
+            f"{none}: in the frame of the wall outlines span {_span_of(drawn.min(axis=0), drawn.max(axis=0))}, "
+            f"the cloud {_span_of(low, high)}, {low[2]:.2f} to {high[2]:.2f} m before it"
+        )
+        remedy = (
+            "move the drawing, or correct the frame (--wall), whose origin is where the drawing has 0,0; check the "
+            f"unit of the outlines (--unit); points count up to {options.slab:g} m from the plane (--slab)"
+        )
     reach = (
         options.slab + float(np.ptp([one.origin for one in placed], axis=0).max()) + max(map(_size, placed))
     )
@@ -168,6 +201,14 @@ def _apart(
             )
             break
     return SurveyError(what, where=str(options.outlines), remedy=remedy)
+
+
+def _shown(place: Array) -> str:
+    return f"({', '.join(f'{coordinate:.2f}' for coordinate in place)})"
+
+
+def _span_of(low: Array, high: Array) -> str:
+    return f"{low[0]:.2f} to {high[0]:.2f} m along and {low[1]:.2f} to {high[1]:.2f} m up"
 
 
 def viewed(head: SurveyHead, wall: Wall, middle: Array) -> SurveyHead:
@@ -318,7 +359,10 @@ def _no_plane(fitted: _Fitted, outline: PlacedOutline, options: CloudOptions) ->
     count = int(fitted.numbers[3])
     if fitted.status == FEW:
         what = f"too few points: {count} within its outline and {options.slab:g} m of its plane"
-        remedy = "check its place, or scan it; margins are set with --margin, the slab with --slab"
+        remedy = (
+            "check its place, or scan it; if it stands out of the wall or lies behind it, give a wider slab, e.g. "
+            "--slab 0.5; margins are set with --margin"
+        )
     elif fitted.status == COVERED:
         what = f"no plane: {count} points, most of which lie before or behind each other"
         remedy = "check the outline; something may cover the stone"

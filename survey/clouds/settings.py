@@ -26,6 +26,7 @@ class CloudOptions(ReadingOptions):
     wall : frame of the plane that outlines without heights lie in; None: they lie in space
     layer : of a file of outlines with several
     chosen : names of attributes of outlines, by meaning
+    outline_unit : length of the unit of outlines [m]; None: as their file states, else metres, unless asked
     outline_sigma : standard deviation of a drawn corner along the wall, where the outline states none [m]
     margin : width along the edge of a stone whose points are left out [m]; None: three times the sigma of its outline
     slab : largest distance of a point of a stone from the plane that its outline lies in [m]
@@ -36,6 +37,7 @@ class CloudOptions(ReadingOptions):
     wall: Wall | None = None
     layer: str | None = None
     chosen: Mapping[str, str] = field(default_factory=dict)
+    outline_unit: float | None = None
     outline_sigma: float = 0.005
     margin: float | None = None
     slab: float = 0.15

@@ -5,11 +5,12 @@ that of a stone. Both are in SI units, and come from handbooks of building stone
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ground.tables.columns import UNITS
 from survey.arrays import Array
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Range",
     "doubt_of",
     "lies_on_its_side",
+    "question_of_unit",
 ]
 
 
@@ -110,7 +112,8 @@ FRICTION = Range(
 )
 
 
-_OPTIONS = {"millimetres": "mm", "centimetres": "cm", "feet": "ft", "inches": "in"}
+_METRIC = ("mm", "cm")
+_UNITS = {name: UNITS[name] for name in (*_METRIC, "ft", "in")}
 _MANY = 1000  # stones of which it is asked on what they stand
 _LOWER = 0.25  # of its height: how much lower the centre of the stones is on which another stands [-]
 
@@ -162,12 +165,10 @@ class Doubt:
     ----------
     text : the value, the usual range, and the likely unit
     impossible : no stone has such a value
-    option : name of the unit of length in which it would be usual, as an option has it; empty if there is none
     """
 
     text: str
     impossible: bool
-    option: str = ""
 
 
 def doubt_of(value: float, of: Range) -> Doubt | None:
@@ -188,5 +189,42 @@ def doubt_of(value: float, of: Range) -> Doubt | None:
     for name, meant in of.units if impossible else ():
         if of.usual[0] <= meant(value) <= of.usual[1]:
             text = f"{text}; in {name} it would be {meant(value):.4g}{unit}"
-            return Doubt(text, impossible, _OPTIONS.get(name, ""))
+            break
     return Doubt(text, impossible)
+
+
+def question_of_unit(lengths: Sequence[float], what: str) -> tuple[str, str] | None:
+    """Ask for the unit of the lengths of stones of a file, most of which are not usual in metres.
+
+    Parameters
+    ----------
+    lengths : of the stones, as if they were in metres
+    what : they are called, in the plural
+
+    Returns
+    -------
+    the question, and its answers; None if the lengths are usual, or usual in no unit
+
+    Examples
+    --------
+    >>> print(*question_of_unit([41.0, 54.0, 60.0, 1.0], "outlines"), sep="; ")
+    3 of 4 outlines have the size of stones in cm, not metres; give --unit cm, or --unit m if they are that large; the \
+usual one would be 0.475 m long in cm, 0.0475 m in mm, 1.21 m in in
+    """
+    low, high = LENGTH.usual
+    odd = [length for length in lengths if not low <= length <= high]
+    if 2 * len(odd) <= len(lengths):
+        return None
+    usual = float(np.median(lengths))
+    sizes = {unit: scale * usual for unit, scale in _UNITS.items() if low <= scale * usual <= high}
+    metric = [unit for unit in _METRIC if unit in sizes]
+    if not sizes:
+        return None
+    middle = math.sqrt(low * high)  # on a scale of ratios
+    unit = min(metric or sizes, key=lambda name: abs(math.log(sizes[name] / middle)))
+    order = [unit, *(name for name in sizes if name != unit)]
+    would = ", ".join(f"{sizes[name]:.3g} m{' long' if name == unit else ''} in {name}" for name in order)
+    return (
+        f"{len(odd)} of {len(lengths)} {what} have the size of stones in {unit}, not metres",
+        f"give --unit {unit}, or --unit m if they are that large; the usual one would be {would}",
+    )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import SurveyError, UsageError
-from survey.arrays import Bools, Ints
+from survey.arrays import Array, Bools, Ints
 from survey.formats.tables.kinds import KINDS, kind_of
 
 __all__ = ["check_stones", "class_of_stones", "neck", "of_class", "refuse_mortar"]
@@ -132,22 +132,44 @@ def refuse_mortar(white: Bools, path: Path) -> None:
     Raises
     ------
     SurveyError
-        if one piece has most of the white, black has many pieces, and white is the thinner of the two
+        if one piece has most of the white, black has many pieces, and most of these are wider than what parts them from
+        the next: an opening in white may be wider than any stone
     """
     from scipy.ndimage import distance_transform_edt, label
+    from scipy.ndimage import maximum as largest_of
 
     if _largest(label(white)[0]) <= _HALF * np.count_nonzero(white):
         return
-    sizes = np.bincount(label(~white)[0].ravel())[1:]
-    pieces = int(np.count_nonzero(sizes >= _SMALLEST))
-    if pieces < _MIN_PIECES or sizes.max() > _HALF * sizes.sum():
+    pieces = label(~white)[0]
+    sizes = np.bincount(pieces.ravel())[1:]
+    large = np.flatnonzero(sizes >= _SMALLEST) + 1
+    if len(large) < _MIN_PIECES or sizes.max() > _HALF * sizes.sum():
         return
-    if distance_transform_edt(white).max() < distance_transform_edt(~white).max():
-        what = f"one piece has most of the white, and black has {pieces} pieces: white is the mortar"
+    widths = 2.0 * np.asarray(largest_of(distance_transform_edt(~white), pieces, large))
+    if np.median(widths - _gaps(pieces)[large]) > 0.0:
+        what = f"one piece has most of the white, and black has {len(large)} pieces: white is the mortar"
         remedy = (
             "invert it, so that stones are white; or name the number or colour of the stones, e.g. --layer 0"
         )
         raise SurveyError(what, where=str(path), remedy=remedy)
+
+
+def _gaps(pieces: NDArray[np.signedinteger]) -> Array:
+    """Return the distance of each numbered piece from the next; infinite for 0, and for a piece alone [px]."""
+    from scipy.ndimage import distance_transform_edt
+
+    away, nearest = distance_transform_edt(pieces == 0, return_indices=True)
+    of_piece = pieces[tuple(nearest)]
+    gaps = np.full(int(pieces.max()) + 1, np.inf)
+    for first, second in (
+        ((slice(None), slice(1, None)), (slice(None), slice(-1))),
+        ((slice(1, None),), (slice(-1),)),
+    ):
+        border = of_piece[first] != of_piece[second]
+        across = away[first][border] + away[second][border]
+        np.minimum.at(gaps, of_piece[first][border], across)
+        np.minimum.at(gaps, of_piece[second][border], across)
+    return gaps
 
 
 def neck(mask: Bools) -> tuple[str, str] | None:

@@ -1,9 +1,11 @@
 """Outlines in DXF drawings: closed curves, whose codes are texts or labels inside them, or their layers."""
 
+import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.dxf_entities import Curve, DrawnText, Entities, entities_of
 from survey.clouds.outlines.outline import Outline, attributes_of, made_code
+from survey.formats.tables.kinds import KINDS, kind_of
 from survey.geometry.polygons import inside
 from survey.geometry.solids import area_vector
 
@@ -27,7 +30,11 @@ _FRAMED = 3  # texts of other outlines within an outline that is no stone
 
 
 def read_dxf(
-    path: Path, layer: str | None, chosen: Mapping[str, str], unit: float | None = None
+    path: Path,
+    layer: str | None,
+    chosen: Mapping[str, str],
+    unit: float | None = None,
+    kinds: Mapping[str, str] | None = None,
 ) -> tuple[tuple[Outline, ...], tuple[tuple[str, str], ...]]:
     """Read the closed curves of a drawing: polylines, splines, circles, ellipses and hatches, also in blocks.
 
@@ -37,9 +44,10 @@ def read_dxf(
     Parameters
     ----------
     path : the file
-    layer : on which outlines lie; None: all that are shown
+    layer : on which outlines lie, or several with commas between them; None: all that are shown
     chosen : {"code": "layer"} or {"code": "text"}, to choose one, or the tag of an attribute by meaning
     unit : length of the drawing's unit [m]; None: as it states
+    kinds : kinds of stones by their abbreviation in lower case
 
     Returns
     -------
@@ -52,19 +60,7 @@ def read_dxf(
     SurveyError
         if it is not a drawing, has no closed curve, or states a unit that is not known
     """
-    ezdxf = optional("ezdxf", "DXF files")
-    try:
-        drawing = ezdxf.readfile(path)
-        entities = entities_of(drawing, layer)
-    except Exception as error:  # ezdxf raises OSError or its own classes
-        what = f"cannot be read as DXF: {' '.join(str(error).split())[:120]}"
-        raise SurveyError(what, where=str(path), remedy="save it as DXF R2000 or later") from error
-    if 2 * sum(text.mirrored for text in entities.texts) > len(entities.texts):
-        raise SurveyError(
-            "most of its texts are mirrored: it shows the wall as in a mirror, or from behind",
-            where=str(path),
-            remedy="mirror the drawing back; if its outlines are as seen from outside, set its texts upright",
-        )
+    drawing, entities = _opened(path, layer)
     code = int(drawing.header.get("$INSUNITS", 0))
     if unit is None and code and code not in _UNITS:
         raise SurveyError(
@@ -78,8 +74,41 @@ def read_dxf(
     drawn = _without_symbols(entities.curves)
     curves = [replace(curve, ring=_flat(curve.ring * scale)) for curve in drawn]
     texts = [replace(text, places=tuple(scale * place for place in text.places)) for text in entities.texts]
-    left = _left_out(entities, len(entities.curves) - len(drawn))
-    return tuple(_coded(curves, texts, chosen, path)), tuple(left)
+    left = list(_left_out(entities, len(entities.curves) - len(drawn)))
+    labels, around = _labelled(curves, texts)
+    stones = [k for k, curve in enumerate(curves) if not curve.chained or _is_stone(k, labels, around, texts)]
+    if len(stones) < len(curves):
+        left.append(
+            (
+                "left out",
+                f"{len(curves) - len(stones)} closed curves of single lines, without a text of their own",
+            )
+        )
+    return tuple(_coded(curves, stones, labels, around, chosen, kinds or {}, path)), tuple(left)
+
+
+def _opened(path: Path, layer: str | None) -> tuple[Any, Entities]:
+    """Return a drawing and its entities."""
+    ezdxf = optional("ezdxf", "DXF files")
+    try:
+        drawing = ezdxf.readfile(path)
+        entities = entities_of(drawing, _layers(layer))
+    except Exception as error:  # ezdxf raises OSError or its own classes
+        what = f"cannot be read as DXF: {' '.join(str(error).split())[:120]}"
+        raise SurveyError(what, where=str(path), remedy="save it as DXF R2000 or later") from error
+    if 2 * sum(text.mirrored for text in entities.texts) > len(entities.texts):
+        raise SurveyError(
+            "most of its texts are mirrored: it shows the wall as in a mirror, or from behind",
+            where=str(path),
+            remedy="mirror the drawing back; if its outlines are as seen from outside, set its texts upright",
+        )
+    return drawing, entities
+
+
+def _layers(named: str | None) -> frozenset[str]:
+    """Return the layers that are named, in lower case: several with commas between them, or one with commas in it."""
+    whole = (named or "").strip().lower()
+    return frozenset(name.strip() for name in (whole, *whole.split(",")) if name.strip())
 
 
 def _without_symbols(curves: Sequence[Curve]) -> list[Curve]:
@@ -130,6 +159,8 @@ def _left_out(entities: Entities, symbols: int) -> Iterator[tuple[str, str]]:
         )
     if entities.left:
         yield "left out", f"{_listed(entities.left)}: neither closed curves nor texts"
+    if entities.others:
+        yield "left out", f"outlines on layers that --layer does not name: {_listed(entities.others)}"
     if entities.hidden:
         yield "hidden", f"outlines on layers that are frozen or off are left out: {_listed(entities.hidden)}"
 
@@ -143,13 +174,10 @@ def _flat(ring: Array) -> Array:
     return ring[:, :2] if not ring[:, 2].any() else ring
 
 
-def _coded(
-    curves: Sequence[Curve], texts: Sequence[DrawnText], chosen: Mapping[str, str], path: Path
-) -> Iterator[Outline]:
-    layers = [curve.layer for curve in curves]
-    wanted = chosen.get("code")
-    by_layer = wanted == "layer" or (wanted is None and not texts and len(set(layers)) == len(layers) > 1)
-    tags = {meaning: name for meaning, name in chosen.items() if name not in ("layer", "text")}
+def _labelled(
+    curves: Sequence[Curve], texts: Sequence[DrawnText]
+) -> tuple[dict[int, list[DrawnText]], Counter[int]]:
+    """Return the texts in each curve, by its place, and the number of those in it that are in a smaller one, too."""
     areas = [_area(curve.ring) for curve in curves]
     smallest = sorted(range(len(curves)), key=lambda k: areas[k])
     labels: dict[int, list[DrawnText]] = {}
@@ -159,29 +187,69 @@ def _coded(
         if holders:
             labels.setdefault(holders[0], []).append(text)
             around.update(holders[1:])
-    for k, curve in enumerate(curves):
+    return labels, around
+
+
+def _is_stone(
+    k: int, labels: Mapping[int, Sequence[DrawnText]], around: Mapping[int, int], texts: Sequence[DrawnText]
+) -> bool:
+    """Return whether a curve of single lines is an outline: of the others of a drawing, frames and tables are."""
+    return around[k] < _FRAMED and (k in labels or not texts)
+
+
+def _coded(
+    curves: Sequence[Curve],
+    stones: Sequence[int],
+    labels: Mapping[int, Sequence[DrawnText]],
+    around: Mapping[int, int],
+    chosen: Mapping[str, str],
+    kinds: Mapping[str, str],
+    path: Path,
+) -> Iterator[Outline]:
+    layers = [curves[k].layer for k in stones]
+    wanted = chosen.get("code")
+    by_layer = wanted == "layer" or (wanted is None and not labels and len(set(layers)) == len(layers) > 1)
+    tags = {meaning: name for meaning, name in chosen.items() if name not in ("layer", "text")}
+    for number, k in enumerate(stones, start=1):
+        curve = curves[k]
         where = f"{path}, {curve.where}"
         if around[k] >= _FRAMED:
-            _refuse_frame(curve, around[k], [curves[i].layer for i in labels if i != k], where)
-        yield _outline(k + 1, curve, labels.get(k, []), by_layer, tags, where)
+            _refuse_frame(curve, around[k], [curves[i].layer for i in labels if around[i] < _FRAMED], where)
+        yield _outline(number, curve, labels.get(k, ()), by_layer, tags, kinds, where)
 
 
 def _refuse_frame(curve: Curve, count: int, layers: Sequence[str], where: str) -> None:
-    usual = Counter(layers).most_common(1)[0][0]
+    stones = [layer for layer in dict.fromkeys(layers) if layer != curve.layer]
     remedy = (
-        f"leave it out with --layer {usual}"
-        if usual != curve.layer
-        else "put it on another layer, and name that of the stones with --layer"
+        f"leave it out with --layer {shlex.quote(','.join(stones))}"
+        if 2 * layers.count(curve.layer) < len(layers)
+        else "put it on another layer, and name those of the stones with --layer"
     )
     raise SurveyError(f"the outline holds {count} texts of other outlines", where=where, remedy=remedy)
 
 
 def _outline(
-    number: int, curve: Curve, texts: Sequence[DrawnText], by_layer: bool, tags: Mapping[str, str], where: str
+    number: int,
+    curve: Curve,
+    texts: Sequence[DrawnText],
+    by_layer: bool,
+    tags: Mapping[str, str],
+    kinds: Mapping[str, str],
+    where: str,
 ) -> Outline:
     values = {tag: text for one in texts for tag, text in one.values.items()}
     attributes = attributes_of(values, {m: name for m, name in tags.items() if name in values}, where)
-    names = [text.text or attributes.code or next(iter(text.values.values()), "") for text in texts]
+    lines = [line for text in texts for line in text.lines]
+    of_kind = [line for line in lines if line.lower() in kinds or kind_of(line, kinds) in KINDS]
+    if len(set(of_kind)) == 1 and attributes.kind is None:  # a word for a kind beside the number, or alone
+        attributes = replace(attributes, kind=of_kind[0])
+        texts = [
+            replace(text, lines=tuple(line for line in text.lines if line not in of_kind)) for text in texts
+        ]
+    names = [
+        " ".join(text.lines) or attributes.code or next(iter(text.values.values()), "") for text in texts
+    ]
+    names = [name for name in names if name]
     name = curve.layer if by_layer else names[0] if names else f"S{number}"
     doubts = []
     if not by_layer and len(names) > 1:

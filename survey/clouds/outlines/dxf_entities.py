@@ -1,12 +1,13 @@
 """Entities of a DXF drawing: closed curves, texts, and what neither is, each with its layer; blocks are resolved."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from survey.arrays import Array
 
@@ -16,6 +17,7 @@ _CLOSE = 0.002  # distance of the ends of a curve that counts as closed, of its 
 _SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
 _DEEPEST = 16  # blocks within blocks
 _CURVES = ("LWPOLYLINE", "POLYLINE", "SPLINE", "CIRCLE", "ELLIPSE")
+_PIECES = (*_CURVES, "LINE", "ARC")
 _SILENT = ("POINT", "ATTDEF", "VIEWPORT", "XLINE", "RAY")  # of which nobody makes a stone
 _BACKWARD = 2  # bit of the flag of a text that is written from right to left (DXF, group 71)
 _SAME_BOX = 0.02  # difference of two boxes that are of one stone, of their size
@@ -31,12 +33,14 @@ class Curve:
     layer : its layer; in a block on layer 0, that of the insert
     where : kind, handle and layer, for messages
     label : number of the inserted label whose block it is of; None if of none
+    chained : whether it was drawn as single lines that meet at their ends
     """
 
     ring: Array
     layer: str
     where: str
     label: int | None = None
+    chained: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,13 +50,13 @@ class DrawnText:
     Attributes
     ----------
     places : where it may stand, in order of preference, each (3,) in drawing units
-    text : it, or ""
+    lines : of it; none of a label
     values : attributes by tag
     mirrored : whether it is written from right to left
     """
 
     places: tuple[Array, ...]
-    text: str
+    lines: tuple[str, ...]
     values: Mapping[str, str] = field(default_factory=dict)
     mirrored: bool = False
 
@@ -68,6 +72,7 @@ class Entities:
     left : number of other entities by kind
     hidden : number of closed curves by layer that is frozen or off
     hidden_texts : number of texts and labels by layer that is frozen or off
+    others : number of closed curves by layer that is shown, but was not named
     """
 
     curves: list[Curve] = field(default_factory=list)
@@ -75,23 +80,24 @@ class Entities:
     left: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
     hidden_texts: Counter[str] = field(default_factory=Counter)
+    others: Counter[str] = field(default_factory=Counter)
 
 
-def entities_of(drawing: Any, layer: str | None) -> Entities:
+def entities_of(drawing: Any, layers: Collection[str]) -> Entities:
     """Sort the entities of the model space.
 
     Parameters
     ----------
     drawing : of ezdxf
-    layer : on which outlines lie, which may be hidden; None: all that are shown
+    layers : in lower case, on which outlines lie, which may be hidden; none: all that are shown
     """
     entities = Entities()
     off = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_frozen() or layer.is_off()}
-    off -= {"" if layer is None else layer.lower()}
-    hatches = list[Curve]()
+    off -= set(layers)
+    hatches, pieces = list[Curve](), list[_Piece]()
     for entity, on, label in _resolved(drawing.modelspace(), count(), 0):
         kind = entity.dxftype()
-        hidden = on.lower() in off or (layer is None and bool(entity.dxf.get("invisible", 0)))
+        hidden = on.lower() in off or (not layers and bool(entity.dxf.get("invisible", 0)))
         if kind in ("TEXT", "MTEXT", "INSERT"):
             if kind == "INSERT" and label is None:  # deeper than blocks are followed
                 entities.left[kind] += 1
@@ -100,17 +106,25 @@ def entities_of(drawing: Any, layer: str | None) -> Entities:
             else:
                 entities.texts.append(_label(entity) if kind == "INSERT" else _text(entity))
             continue
-        if kind in _SILENT or (layer is not None and on.lower() != layer.lower()):
+        if kind in _SILENT:
             continue
         where = f"{kind} {entity.dxf.handle or 'of a block'} on layer {on}"
         rings = _rings(entity)
-        if not rings:
-            entities.left[f"open {kind}" if kind in _CURVES else kind] += 1
+        if layers and on.lower() not in layers:
+            if not hidden and rings:
+                entities.others[on] += len(rings)
+        elif not rings and kind in _PIECES and not hidden and len(corners := _corners(entity)) > 1:
+            pieces.append(_Piece(corners, on, kind, entity.dxf.handle or "of a block", label))
+        elif not rings:
+            entities.left[_open(kind)] += 1
         elif hidden:
             entities.hidden[on] += len(rings)
         else:
             found = hatches if kind == "HATCH" else entities.curves
             found.extend(Curve(ring, on, where, label) for ring in rings)
+    chained, rest = _chained(pieces)
+    entities.curves += chained
+    entities.left.update(_open(piece.kind) for piece in rest)
     boxes = [_box(curve.ring) for curve in entities.curves]
     # the filling of an outline is not a second stone
     entities.curves += [hatch for hatch in hatches if not any(_alike(_box(hatch.ring), box) for box in boxes)]
@@ -144,11 +158,11 @@ def _resolved(
 def _text(entity: Any) -> DrawnText:
     if entity.dxftype() == "MTEXT":
         behind = entity.dxf.extrusion.z < 0.0
-        return DrawnText(
-            (_vector(entity.dxf.insert),), " ".join(entity.plain_text().split()), mirrored=behind
-        )
+        lines = (" ".join(line.split()) for line in entity.plain_text(split=True))
+        return DrawnText((_vector(entity.dxf.insert),), tuple(filter(None, lines)), mirrored=behind)
     mirrored = bool(entity.dxf.text_generation_flag & _BACKWARD) != (entity.dxf.extrusion.z < 0.0)
-    return DrawnText((_place(entity),), " ".join(entity.dxf.text.split()), mirrored=mirrored)
+    line = " ".join(entity.dxf.text.split())
+    return DrawnText((_place(entity),), (line,) if line else (), mirrored=mirrored)
 
 
 def _label(insert: Any) -> DrawnText:
@@ -159,7 +173,7 @@ def _label(insert: Any) -> DrawnText:
         if attribute.dxf.text.strip()
     }
     places = (*map(_place, insert.attribs), _place(insert))
-    return DrawnText(places, "", values)
+    return DrawnText(places, (), values)
 
 
 def _place(entity: Any) -> Array:
@@ -190,9 +204,72 @@ def _rings(entity: Any) -> list[Array]:
     return [_opened(corners)] if len(corners) >= 3 and _is_closed(entity, corners) else []
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """A curve that is not closed: its places (n, 3), layer, kind, handle, and the label that it is of."""
+
+    places: Array
+    layer: str
+    kind: str
+    handle: str
+    label: int | None
+
+
+def _open(kind: str) -> str:
+    return f"open {kind}" if kind in _CURVES else kind
+
+
+def _chained(pieces: Sequence[_Piece]) -> tuple[list[Curve], list[_Piece]]:
+    """Join pieces of one layer that meet at their ends, two at each, to closed curves; return also the others."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    curves, rest = list[Curve](), list[_Piece]()
+    for layer in dict.fromkeys((piece.layer, piece.label) for piece in pieces):
+        some = [piece for piece in pieces if (piece.layer, piece.label) == layer]
+        ends = np.array([piece.places[k] for piece in some for k in (0, -1)])
+        lengths = [float(np.linalg.norm(piece.places[0] - piece.places[-1])) for piece in some]
+        pairs = cKDTree(ends).query_pairs(_CLOSE * float(np.median(lengths)), output_type="ndarray")
+        meeting = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(ends), len(ends)))
+        _, nodes = connected_components(meeting, directed=False)
+        two = np.bincount(nodes) == 2  # ends in each node
+        along = coo_array((np.ones(len(some)), nodes.reshape(-1, 2).T), shape=(len(two), len(two)))
+        _, groups = connected_components(along, directed=False)
+        closed = np.ones(groups.max() + 1, np.bool_)
+        np.logical_and.at(closed, groups, two)
+        members: dict[int, list[int]] = {}
+        for k in range(len(some)):
+            members.setdefault(int(groups[nodes[2 * k]]), []).append(k)
+        for group, of_group in members.items():
+            if closed[group] and len(ring := _walked(some, of_group, nodes)) >= 3:
+                first = some[of_group[0]]
+                where = f"{len(of_group)} {first.kind} from {first.handle} on layer {first.layer}"
+                curves.append(Curve(ring, first.layer, where, first.label, chained=True))
+            else:
+                rest += [some[k] for k in of_group]
+    return curves, rest
+
+
+def _walked(pieces: Sequence[_Piece], members: Sequence[int], nodes: NDArray[np.signedinteger]) -> Array:
+    """Return the places (n, 3) of pieces that form a closed curve, in order."""
+    open_pieces, ring = list(members[1:]), [pieces[members[0]].places[:-1]]
+    end = nodes[2 * members[0] + 1]
+    while open_pieces:
+        k = next(k for k in open_pieces if end in nodes[2 * k : 2 * k + 2])
+        forwards = nodes[2 * k] == end
+        places = pieces[k].places if forwards else pieces[k].places[::-1]
+        ring.append(places[:-1])
+        end = nodes[2 * k + 1] if forwards else nodes[2 * k]
+        open_pieces.remove(k)
+    return np.concatenate(ring)
+
+
 def _corners(entity: Any) -> Array:
     """Return the corners (n, 3) of a curve, arcs by chords."""
     kind = entity.dxftype()
+    if kind == "LINE":
+        return np.array([tuple(entity.dxf.start), tuple(entity.dxf.end)])
     if kind == "POLYLINE" and entity.is_3d_polyline:
         return np.array([tuple(vertex.dxf.location) for vertex in entity.vertices], dtype=np.float64)
     if kind in ("LWPOLYLINE", "POLYLINE") and not entity.has_arc:

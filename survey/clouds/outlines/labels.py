@@ -19,7 +19,8 @@ from survey.geometry.polygons import ring_area
 __all__ = ["Labels", "outline_of_mask", "outlines_of", "read_labels"]
 
 _LARGEST = 2**24  # number of a stone: as many as there are colours
-_GREY = 0.02  # share of pixels that are neither black nor white in a picture of two colours: blurred edges
+_GREY = 0.02  # share of pixels that are neither black nor white, and not between both, in a picture of two colours
+_RIM = 5  # pixels of the square in which the smoothed edge between black and white has both
 _DARK, _WHITE = 32, 223  # of 255
 _SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
 _SMALLEST = 12  # pixels of the smallest piece that can be a stone
@@ -69,10 +70,14 @@ def read_labels(path: Path, stones: str | None = None) -> Labels:
     """
     pixels, tags = _pixels(path)
     places = world_of(path, tags)
-    two = _two_colours(pixels) if stones is None else of_class(pixels, stones, path)
+    two = _two_colours(pixels)
+    if stones is None and two is not None:
+        refuse_mortar(two, path)
+    elif stones is not None:
+        named = of_class(pixels, stones, path)
+        # of black and white, with edges between them, the one that holds the colour that is named
+        two = named if two is None else two if two[named].mean() > 0.5 else ~two
     if two is not None:
-        if stones is None:
-            refuse_mortar(two, path)
         numbers, specks, smallest = _pieces(two)
         if not numbers.any():
             raise SurveyError("no white piece is large enough for a stone", where=str(path), remedy=_REMEDY)
@@ -173,11 +178,19 @@ def _two_colours(pixels: NDArray[Any]) -> NDArray[np.bool_] | None:
     used = np.flatnonzero(counts)
     if len(used) == 2 and used[0] == 0:
         return np.asarray(grey > 0)
-    between = counts[_DARK : _WHITE + 1].sum() / grey.size
-    if used[-1] > _WHITE and between < _GREY and counts[:_DARK].sum() and counts[_WHITE:].sum():
-        # labels that are counted from 1 fill the dark range without ever being white
-        return np.asarray(grey > 127) if counts[1:_DARK].sum() < 0.5 * counts[_WHITE:].sum() else None
-    return None
+    # labels that are counted from 1 fill the dark range without ever being white
+    if not (counts[0] and counts[1:_DARK].sum() < 0.5 * counts[_WHITE:].sum()):
+        return None
+    return np.asarray(grey > 127) if _inner_greys(grey) < _GREY * grey.size else None
+
+
+def _inner_greys(grey: NDArray[np.uint8]) -> int:
+    """Return the number of pixels that are neither black nor white, nor of the smoothed edge between both."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    inner = (grey >= _DARK) & (grey <= _WHITE)
+    inner &= (minimum_filter(grey, _RIM) >= _DARK) | (maximum_filter(grey, _RIM) <= _WHITE)
+    return int(np.count_nonzero(inner))
 
 
 def _pieces(white: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int, int]:

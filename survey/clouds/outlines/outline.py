@@ -1,7 +1,7 @@
 """An outline of a stone, and what its attributes say of the stone."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -24,6 +24,8 @@ __all__ = [
     "columns_of",
     "distinct",
     "field_map",
+    "joined_code",
+    "joined_names",
     "made_code",
 ]
 
@@ -136,7 +138,7 @@ class WrongOutline:
 
 
 def field_map(text: str | None) -> dict[str, str]:
-    """Read which attribute is which column, e.g. "code=Stein_Nr,course=Lage".
+    """Read which attribute is which column, e.g. "code=Stein_Nr,course=Lage"; a code may be of several, "code=Lage+Nr".
 
     Raises
     ------
@@ -171,7 +173,10 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
         if a chosen attribute is missing, or a value cannot be read
     """
     columns = columns_of(tuple(values), chosen, where)
-    texts = {meaning: _text(values[name]) for meaning, name in columns.items()}
+    texts = {
+        meaning: joined_code(values, name) if meaning == "code" else _text(values[name])
+        for meaning, name in columns.items()
+    }
     if "zone" not in chosen and _is_measure(texts.get("zone")):
         del texts["zone"], columns["zone"]  # an area that a program computed
     if (
@@ -180,7 +185,7 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
         and not _is_count(texts["course"])
     ):
         del texts["course"], columns["course"]
-    used = set(columns.values())
+    used = {*columns.values(), *_parts(columns.get("code", ""), values)}
     notes = {
         _key(name): text[:200]
         for name, value in values.items()
@@ -216,6 +221,47 @@ def made_code(text: str) -> str:
     return re.sub(r"[^\w.+/:-]+", "-", plain.strip()).strip("-_")[:64].strip("-_")
 
 
+def joined_code(values: Mapping[str, Any], name: str) -> str | None:
+    """Return the name of a stone by that of its attribute, or of several: "Lage+Nr" joins them by hyphens.
+
+    >>> joined_code({"Lage": 5, "Nr": 3.0}, "Lage+Nr")
+    '5-3'
+    """
+    if name in values:
+        return _text(values[name])
+    texts = [_text(values.get(column)) for column in name.split("+")]
+    return "-".join(made_code(text) for text in texts if text) or None
+
+
+def _parts(name: str, names: Container[str]) -> tuple[str, ...]:
+    """Return the attributes that a code is made of; none if it is of one, or one is missing."""
+    parts = tuple(name.split("+"))
+    return parts if len(parts) > 1 and name not in names and all(column in names for column in parts) else ()
+
+
+def joined_names(outlines: Sequence[Outline], names: Sequence[str], chosen: Mapping[str, str]) -> str | None:
+    """Return the attributes that name a stone together, "Lage+Nr", where numbers begin anew in each course.
+
+    Parameters
+    ----------
+    outlines : of a file
+    names : of their attributes
+    chosen : names that the user has given, by meaning
+
+    Returns
+    -------
+    as `--fields` has them; None if most stones have a code of their own, or nothing says in which course they are
+    """
+    columns = columns_of(names, chosen, "")
+    courses: dict[str, list[int | None]] = {}
+    for outline in outlines:
+        courses.setdefault(outline.code, []).append(outline.said.course)
+    shared = sum(len(set(numbers)) > 1 for numbers in courses.values())
+    if not {"course", "code"} <= columns.keys() or 2 * shared <= len(courses):
+        return None
+    return f"{columns['course']}+{columns['code']}"
+
+
 def columns_of(names: Sequence[str], chosen: Mapping[str, str], where: str) -> dict[str, str]:
     """Find the names of attributes by what they mean.
 
@@ -232,7 +278,7 @@ def columns_of(names: Sequence[str], chosen: Mapping[str, str], where: str) -> d
     out = {}
     for meaning, words in _SPELLED.items():
         if meaning in chosen:
-            if chosen[meaning] not in names:
+            if chosen[meaning] not in names and not (meaning == "code" and _parts(chosen[meaning], names)):
                 known = ", ".join(names) or "none"
                 raise SurveyError(
                     f"no attribute {chosen[meaning]!r}", where=where, remedy=f"attributes are: {known}"

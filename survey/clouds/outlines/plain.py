@@ -11,7 +11,13 @@ from ground.tables import table as tables
 from ground.tables.columns import COORDINATES, length_scale, places_of, unit_of
 from ground.tables.numbers import is_number
 from survey.arrays import Array
-from survey.clouds.outlines.outline import Outline, attributes_of, columns_of, made_code
+from survey.clouds.outlines.outline import (
+    Outline,
+    attributes_of,
+    columns_of,
+    joined_code,
+    made_code,
+)
 
 __all__ = ["is_plain", "read_plain_json", "read_table"]
 
@@ -82,7 +88,7 @@ def _entries(path: Path, content: list[Any], chosen: Mapping[str, str]) -> Itera
 
 def read_table(
     path: Path, chosen: Mapping[str, str], unit: float | None = None, sheet: str | None = None
-) -> tuple[Outline, ...]:
+) -> tuple[tuple[Outline, ...], tuple[str, ...]]:
     """Read a table with a row for each corner, in the plane of the wall, or in space where it has three coordinates.
 
     Parameters
@@ -91,6 +97,10 @@ def read_table(
     chosen : names of columns that the user has given, by meaning
     unit : length of the unit of corners, where columns state none [m]; None: metres
     sheet : of a workbook with several
+
+    Returns
+    -------
+    the outlines, one for each name in a course, and the names of the columns
 
     Raises
     ------
@@ -101,30 +111,35 @@ def read_table(
     header = table.titles[-1] if table.titles else tables.TableRow(1, ())
     titles, where = header.cells, table.where(header.line)
     at = places_of(titles, _CORNERS, where)
-    name = columns_of(titles, chosen, where).get("code") if titles else None
+    columns = columns_of(titles, chosen, where) if titles else {}
+    name = columns.get("code")
     sides = [at[axis] for axis in "xyz" if axis in at]
     if "x" not in at or len(sides) < 2 or name is None:
         names = ", ".join(titles or table.rows[0].cells)
         raise SurveyError(f"columns {names}", where=where, remedy=_CSV)
-    code = titles.index(name)
     scales = [length_scale(titles[k], where) or unit or 1.0 for k in sides]
-    corners: dict[str, list[list[float]]] = {}
-    first: dict[str, tuple[int, dict[str, Any]]] = {}
+    corners: dict[tuple[str, str], list[list[float]]] = {}
+    first: dict[tuple[str, str], tuple[int, dict[str, Any]]] = {}
     for row in table.rows:
         cells = [*row.cells, *[""] * (len(titles) - len(row.cells))]
         place = [
             scale * table.number(cells[k], unit_of(titles[k])[0], row.line)
             for scale, k in zip(scales, sides, strict=True)
         ]
-        stone = table.name(row, code, "the stone of a corner")
-        corners.setdefault(stone, []).append(place)
+        stone = (
+            table.name(row, titles.index(name), "the stone of a corner")
+            if name in titles
+            else joined_code(dict(zip(titles, cells, strict=False)), name) or ""
+        )
+        course = cells[titles.index(columns["course"])] if "course" in columns else ""
+        corners.setdefault((stone, course), []).append(place)
         others = {
             title: cell
             for k, (title, cell) in enumerate(zip(titles, cells, strict=False))
             if title and cell and k not in sides
         }
-        first.setdefault(stone, (row.line, others))
-    return tuple(_of_rows(path, corners, first, chosen))
+        first.setdefault((stone, course), (row.line, others))
+    return tuple(_of_rows(path, corners, first, chosen)), tuple(titles)
 
 
 def _is_row(cells: Sequence[str], commas: bool) -> bool:
@@ -133,12 +148,13 @@ def _is_row(cells: Sequence[str], commas: bool) -> bool:
 
 def _of_rows(
     path: Path,
-    corners: Mapping[str, list[list[float]]],
-    first: Mapping[str, tuple[int, dict[str, Any]]],
+    corners: Mapping[tuple[str, str], list[list[float]]],
+    first: Mapping[tuple[str, str], tuple[int, dict[str, Any]]],
     chosen: Mapping[str, str],
 ) -> Iterator[Outline]:
-    for number, (name, places) in enumerate(corners.items(), start=1):
-        line, values = first[name]
+    """Make outlines of the corners of each name and course."""
+    for number, ((name, course), places) in enumerate(corners.items(), start=1):
+        line, values = first[name, course]
         where = f"{path}:{line}"
         attributes = attributes_of(values, chosen, where)
         yield Outline(number, _code(name, number), _open(places), attributes, where)

@@ -12,7 +12,7 @@ from survey.clouds.outlines.annotations import is_annotated, read_annotations
 from survey.clouds.outlines.coco import is_coco, load_json, read_coco
 from survey.clouds.outlines.dxf import read_dxf
 from survey.clouds.outlines.labels import outlines_of, read_labels
-from survey.clouds.outlines.outline import Outline, WrongOutline
+from survey.clouds.outlines.outline import Outline, WrongOutline, joined_names
 from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
 from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.outlines.vector import read_vector
@@ -49,6 +49,7 @@ class Drawing:
     smallest : pieces of fewer pixels are specks
     left : what the file has besides, and was not read: (reason, text)
     wrong : features that are no outline of a stone
+    names : of the attributes of its features; none of pictures and drawings
     """
 
     path: Path
@@ -60,6 +61,7 @@ class Drawing:
     smallest: int = 0
     left: tuple[tuple[str, str], ...] = ()
     wrong: tuple[WrongOutline, ...] = ()
+    names: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -107,9 +109,10 @@ def read_outlines(
     """
     if not path.is_file():
         raise UsageError("no such file", where=str(path), remedy="name a file of outlines with --outlines")
-    drawing = _read(path, layer, chosen or {}, smooth, unit)
+    drawing = _read(path, layer, chosen or {}, smooth, unit, kinds or {})
     if not drawing.outlines and not drawing.wrong:
         raise SurveyError("has no outlines", where=str(path), remedy="draw each stone as a polygon")
+    _check_numbers(drawing, chosen or {}, kinds or {})
     outlines, wrong = [], [*drawing.wrong]
     for outline in drawing.outlines:
         try:
@@ -125,11 +128,16 @@ def read_outlines(
 
 
 def _read(
-    path: Path, layer: str | None, chosen: Mapping[str, str], smooth: float, unit: float | None
+    path: Path,
+    layer: str | None,
+    chosen: Mapping[str, str],
+    smooth: float,
+    unit: float | None,
+    kinds: Mapping[str, str],
 ) -> Drawing:
     ending = path.suffix.lower()
     if ending == ".dxf":
-        outlines, left = read_dxf(path, layer, chosen, unit)
+        outlines, left = read_dxf(path, layer, chosen, unit, kinds)
         return Drawing(path, outlines, left=left)
     if ending in PICTURES:
         labels = read_labels(path, layer)
@@ -143,12 +151,13 @@ def _read(
     if ending == ".json" and is_plain(content):
         return _scaled(Drawing(path, read_plain_json(path, content, chosen)), unit)
     if ending in _TABLES and not _has_geometry(path):
-        return Drawing(path, read_table(path, chosen, unit, layer))
+        outlines, names = read_table(path, chosen, unit, layer)
+        return Drawing(path, outlines, names=names)
     if ending in (*_VECTORS, ".csv"):
-        features = read_vector(path, layer, chosen, unit is not None)
+        features, names = read_vector(path, layer, chosen, unit is not None)
         sound = tuple(feature for feature in features if isinstance(feature, Outline))
         wrong = tuple(feature for feature in features if isinstance(feature, WrongOutline))
-        return _scaled(Drawing(path, sound, wrong=wrong), unit)
+        return _scaled(Drawing(path, sound, wrong=wrong, names=names), unit)
     if ending in (".jpg", ".jpeg"):
         what, remedy = "JPEG smears the edges of stones", "export the picture of stones as PNG or TIFF"
         raise UsageError(what, where=str(path), remedy=remedy)
@@ -177,13 +186,32 @@ def _scaled(drawing: Drawing, unit: float | None) -> Drawing:
     )
 
 
+def _check_numbers(drawing: Drawing, chosen: Mapping[str, str], kinds: Mapping[str, str]) -> None:
+    """Refuse outlines that are numbered anew in each course, with all that the file leaves to be asked."""
+    both = joined_names(drawing.outlines, drawing.names, chosen)
+    if both is None:
+        return
+    others = "".join(f",{meaning}={name}" for meaning, name in chosen.items() if meaning != "code")
+    words = dict.fromkeys(outline.said.kind for outline in drawing.outlines if outline.said.kind is not None)
+    unknown = ",".join(f"{word}=ashlar" for word in words if KIND.fullmatch(kind_of(word, kinds)) is None)
+    raise SurveyError(
+        "most numbers of stones stand in several courses: they are numbered anew in each",
+        where=str(drawing.path),
+        remedy=f'name stones by both: --fields "code={both}{others}"'
+        + (f', and say what kinds stand for: --kinds "{unknown}"' if unknown else ""),
+    )
+
+
 def _of_kind(outline: Outline, kinds: Mapping[str, str]) -> Outline:
     """Return an outline whose kind is that of the word or abbreviation in the file."""
     if (text := outline.said.kind) is None:
         return outline
     kind = kind_of(text, kinds)
     if KIND.fullmatch(kind) is None:
-        remedy = "kinds are words like ashlar, see moma schema; or name another attribute with --fields"
+        remedy = (
+            f'say what it stands for, e.g. --kinds "{text[:40]}=ashlar", see moma schema; or name another attribute '
+            "with --fields"
+        )
         raise SurveyError(f"kind is {text!r}", where=outline.where, remedy=remedy)
     return replace(outline, said=replace(outline.said, kind=kind))
 

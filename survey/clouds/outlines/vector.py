@@ -10,7 +10,13 @@ import numpy as np
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.extras import optional
-from survey.clouds.outlines.outline import Attributes, Outline, WrongOutline, attributes_of, made_code
+from survey.clouds.outlines.outline import (
+    Attributes,
+    Outline,
+    WrongOutline,
+    attributes_of,
+    made_code,
+)
 
 __all__ = ["read_vector"]
 
@@ -21,7 +27,7 @@ _SMALL = 0.02  # share of the area of the largest part up to which other parts a
 
 def read_vector(
     path: Path, layer: str | None, chosen: Mapping[str, str], scaled: bool = False
-) -> tuple[Outline | WrongOutline, ...]:
+) -> tuple[tuple[Outline | WrongOutline, ...], tuple[str, ...]]:
     """Read the polygons of a file; an unclosed ring is closed.
 
     Parameters
@@ -30,6 +36,10 @@ def read_vector(
     layer : its name; None: the only one
     chosen : names of attributes that the user has given, by meaning
     scaled : whether the user has stated the unit of its coordinates
+
+    Returns
+    -------
+    the features, and the names of their attributes
 
     Raises
     ------
@@ -71,7 +81,7 @@ def read_vector(
             {name: column[k] for name, column in zip(names, columns, strict=True)}, chosen, where
         )
         out.append(_outline(k + 1, int(fids[k]), shape, attributes, where))
-    return tuple(out)
+    return tuple(out), tuple(names)
 
 
 def _check_degrees(path: Path, bounds: Array) -> None:

@@ -103,3 +103,24 @@ def test_pictures_of_the_cases():
     assert len(read_outlines(CASES / "i_three_classes.png", layer="100").outlines) == 12
     with pytest.raises(SurveyError, match="resampled"):
         read_outlines(CASES / "c_rgb_antialiased.png")
+
+
+@pytest.mark.parametrize("black_stones", [False, True])
+@pytest.mark.parametrize("opening", [False, True])
+def test_smoothed_edges_between_black_and_white_are_read(tmp_path, black_stones, opening):
+    stones = bricks() > 0
+    if opening:  # wider than any stone
+        stones[: 3 * (STONE + JOINT), STONE + JOINT : 3 * (STONE + JOINT) + JOINT] = False
+    count = ROWS * COLUMNS - (6 if opening else 0)
+    white = np.where(stones != black_stones, 255, 0).astype(np.uint8)
+    high, wide = white.shape
+    picture = Image.fromarray(white).resize((4 * wide, 4 * high), Image.Resampling.NEAREST)
+    path = tmp_path / "a.png"
+    picture.resize((int(2.5 * wide), int(2.5 * high)), Image.Resampling.LANCZOS).convert("RGB").save(path)
+    if black_stones:
+        with pytest.raises(SurveyError, match=f"black has {count} pieces: white is the mortar.*--layer 0"):
+            read_outlines(path)
+    found = read_outlines(path, layer="0" if black_stones else None).outlines
+    assert len(found) == count
+    sides = np.array([np.ptp(one.corners, axis=0) for one in found])
+    assert np.abs(sides - 2.5 * STONE).max() < 2.5

@@ -144,8 +144,22 @@ def test_outlines_of_a_plane_need_a_wall(tmp_path):
 
 def test_a_cloud_beside_its_outlines_is_told(tmp_path, wall):
     path = scans.geojson(tmp_path / "a.geojson")
-    with pytest.raises(SurveyError, match=r"none of its \d+ points lies in an outline: outlines lie about"):
+    with pytest.raises(
+        SurveyError,
+        match=r"none of its \d+ points lies in an outline: .*0.01 to 0.59 m up, the cloud .* 5.00 to",
+    ):
         measured(tmp_path, scans.scan(0.05) + np.array([0.0, 0.0, 5.0]), path, wall=wall)
+
+
+@pytest.mark.parametrize(("unit", "length"), [("cm", 0.01), ("mm", 0.001)])
+def test_the_unit_of_outlines_beside_a_cloud_is_asked_for(tmp_path, wall, unit, length):
+    path = scans.geojson(tmp_path / "a.geojson", [ring / length for ring in scans.rings()])
+    with pytest.raises(
+        SurveyError, match=f"6 of 6 outlines have the size of stones in {unit}, .*--unit {unit}, or"
+    ):
+        measured(tmp_path, scans.scan(0.05), path, wall=wall)
+    stones = list(measured(tmp_path, scans.scan(), path, wall=wall, outline_unit=length).blocks)
+    assert [one.code for one in stones] == list(scans.CODES)
 
 
 def test_the_review_lists_overlaps_odd_sizes_leaks_scores_and_few_points(tmp_path, wall):

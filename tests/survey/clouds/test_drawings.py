@@ -1,6 +1,7 @@
 """Drawings and annotations as offices deliver them: blocks, labels, hidden layers, units, elevations, classes."""
 
 import json
+import shlex
 
 import ezdxf
 import numpy as np
@@ -297,3 +298,80 @@ def test_texts_written_backwards_are_a_question(drawing):
     space.add_text("north", dxfattribs={"insert": (5, 5), "text_generation_flag": 2})
     with pytest.raises(SurveyError, match="most of its texts are mirrored"):
         drawing.read()
+
+
+@pytest.mark.parametrize("names", [("QUADER", "BOGEN"), ("QUADER", "BOGEN", "A B"), ("STEINE 1,2",)])
+def test_a_frame_is_left_out_by_the_layers_of_all_stones(drawing, names):
+    space = drawing.modelspace()
+    for k in range(6):
+        square(space, 0.6 * k, layer=names[k % len(names)])
+        space.add_text(f"{k + 1}", height=0.02).set_placement((0.6 * k + 0.2, 0.1))
+    frame = drawing.blocks.new("FRAME")
+    frame.add_lwpolyline([(-1, -1), (9, -1), (9, 1), (-1, 1)], close=True)
+    frame.add_lwpolyline([(7, -1), (9, -1), (9, -0.5), (7, -0.5)], close=True)
+    frame.add_attdef("PLAN", (7.1, -0.9))
+    insert = space.add_blockref("FRAME", (0, 0), dxfattribs={"layer": "RAHMEN"})
+    insert.add_auto_attribs({"PLAN": "123.04"})
+    with pytest.raises(SurveyError, match="the outline holds 7 texts") as refused:
+        drawing.read()
+    layers = shlex.split(str(refused.value).partition("with --layer ")[2])
+    found = drawing.read(layer=layers[0])
+    assert [one.code for one in found.outlines] == ["1", "2", "3", "4", "5", "6"]
+    assert ("left out", "outlines on layers that --layer does not name: 2 RAHMEN") in found.left
+
+
+def outline_of_pieces(space, x, pieces):
+    """Draw one stone as lines, an arc, or open polylines that meet at their ends."""
+    a, b, c, d = [(x + one, two) for one, two in SQUARE]
+    if pieces == "lines":
+        for start, stop in ((c, b), (a, b), (c, d), (a, d)):
+            space.add_line(start, stop)
+    elif pieces == "arc":
+        space.add_arc((x + 0.25, 0.3), 0.25, 0, 180)
+        space.add_lwpolyline([d, a, b, c])
+    else:
+        space.add_lwpolyline([b, a, d])
+        space.add_line(b, c)
+        space.add_line(d, c)
+
+
+@pytest.mark.parametrize(("pieces", "corners"), [("lines", 4), ("arc", 5), ("polylines", 4)])
+def test_single_lines_that_meet_at_their_ends_are_an_outline(drawing, pieces, corners):
+    space = drawing.modelspace()
+    for k in range(3):
+        outline_of_pieces(space, 0.6 * k, pieces)
+    assert len(drawing.read().outlines) == 3
+    for k in range(3):
+        space.add_text(f"N{k}", height=0.02).set_placement((0.6 * k + 0.2, 0.1))
+    for start, stop in (((-1, -1), (5, -1)), ((5, -1), (5, 2)), ((5, 2), (-1, 2)), ((-1, 2), (-1, -1))):
+        space.add_line(start, stop)  # a frame
+    space.add_line((-1, -1), (-2, -1))
+    outline_of_pieces(space, 3.0, pieces)  # a symbol without a text
+    found = drawing.read()
+    assert [one.code for one in found.outlines] == ["N0", "N1", "N2"]
+    assert all(len(one.corners) >= corners for one in found.outlines)
+    left = {text.partition(" ")[0]: text for _, text in found.left}
+    assert "closed curves of single lines, without a text" in left["1"]
+    assert "5 LINE" in left["5"]  # a frame from whose corner a line leads away is no closed curve
+
+
+@pytest.mark.parametrize("label", ["lines", "texts", "abbreviation"])
+def test_a_word_for_a_kind_in_a_label_is_the_kind(drawing, label):
+    space = drawing.modelspace()
+    for k, word in enumerate(("Läufer", "Binder")):
+        square(space, 0.6 * k)
+        word = word[0] if label == "abbreviation" else word
+        if label == "texts":
+            space.add_text(word, height=0.02).set_placement((0.6 * k + 0.1, 0.2))
+            space.add_text(f"1-{k}", height=0.02).set_placement((0.6 * k + 0.2, 0.1))
+        else:
+            text = rf"{{\fArial|b0;\C1;1-{k}}}\P{{\H0.5x;{word}}}"
+            space.add_mtext(text, dxfattribs={"char_height": 0.02, "insert": (0.6 * k + 0.2, 0.2)})
+    square(space, 1.2)
+    space.add_text("Binder" if label != "abbreviation" else "B", height=0.02).set_placement((1.4, 0.1))
+    found = drawing.read(
+        kinds={"l": "stretcher", "b": "header"} if label == "abbreviation" else None
+    ).outlines
+    kinds = ["stretcher", "header", "header"]
+    assert [(one.code, one.said.kind) for one in found] == list(zip(("1-0", "1-1", "S3"), kinds, strict=True))
+    assert not any(one.doubts for one in found)

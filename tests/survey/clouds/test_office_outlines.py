@@ -1,13 +1,15 @@
 """Outlines as offices export them: names of attributes, labels of drawings, classes, tables of corners, pixels."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from ground.errors import SurveyError, UsageError
-from survey.clouds.outlines.outline import attributes_of
+from survey.clouds.outlines.outline import attributes_of, field_map
 from survey.clouds.outlines.reading import read_outlines
+from survey.formats.tables.kinds import read_kinds
 from tests.survey.clouds.scans import CODES, geojson, rings
 from tests.survey.formats.workbooks import xlsx
 
@@ -192,3 +194,41 @@ def test_outlines_on_a_picture_without_a_world_file_are_asked_for_the_size_of_a_
     with pytest.raises(SurveyError, match="pixels of a picture without a world file"):
         read_outlines(path)
     assert len(read_outlines(path, unit=0.001).outlines) == len(CODES)
+
+
+ANEW = {"Lage": [1, 1, 1, 2, 2, 2], "Nr": [1, 2, 3, 1, 2, 3]}
+
+
+@pytest.mark.parametrize("corners", [False, True])
+def test_numbers_that_begin_anew_in_each_course_are_joined_as_the_message_says(tmp_path, corners):
+    path = geojson(tmp_path / "a.geojson", **ANEW, Typ=["Rückwand"] * 6)
+    path.write_text(path.read_text(encoding="utf-8").replace('"code"', '"Foto"'), encoding="utf-8")
+    if corners:
+        path = tmp_path / "a.csv"
+        rows = [
+            f"{ANEW['Lage'][k]};{ANEW['Nr'][k]};Rückwand;{x};{y}"
+            for k, ring in enumerate(rings())
+            for x, y in ring
+        ]
+        path.write_text("\n".join(["Lage;Nr;Typ;x;y", *rows]), encoding="utf-8")
+    with pytest.raises(SurveyError, match="numbered anew in each") as refused:
+        read_outlines(path)
+    fields, kinds = re.findall(r'--(?:fields|kinds) "([^"]*)"', str(refused.value))
+    assert (fields, kinds) == ("code=Lage+Nr", "Rückwand=ashlar")
+    found = read_outlines(path, chosen=field_map(fields), kinds=read_kinds(kinds)).outlines
+    assert [one.code for one in found] == ["1-1", "1-2", "1-3", "2-1", "2-2", "2-3"]
+    assert [one.said.course for one in found] == ANEW["Lage"]
+    assert all(len(one.corners) == 4 and one.said.notes.keys() <= {"Foto"} for one in found)
+
+
+def test_a_code_that_stands_twice_by_a_slip_is_no_number_of_a_course(tmp_path):
+    path = geojson(tmp_path / "a.geojson", codes=["1", "2", "3", "4", "5", "1"], Lage=ANEW["Lage"])
+    assert len(read_outlines(path).outlines) == 6
+
+
+def test_a_kind_that_is_not_known_is_stated_as_the_message_says(tmp_path):
+    path = geojson(tmp_path / "a.geojson", Typ=["Rückwand"] * 6)
+    with pytest.raises(SurveyError) as refused:
+        read_outlines(path)
+    (kinds,) = re.findall(r'--kinds "([^"]*)"', str(refused.value))
+    assert {one.said.kind for one in read_outlines(path, kinds=read_kinds(kinds)).outlines} == {"ashlar"}
