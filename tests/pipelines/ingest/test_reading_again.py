@@ -110,3 +110,24 @@ def test_advice_of_the_cases_can_be_followed(tmp_path, url, file, answer):
     (done,) = read(path, url, **answer).files
     assert done.questions == ()
     assert longest(url)[0] < 3.0
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "words"),
+    [
+        ({"A": "1,2o"}, "write e.g. 12.345$"),
+        ({"A": "1,2o", "B": "0,3o"}, "; 1 more of 3 stones are wrong; --keep-going takes the rest$"),
+        (
+            {"A": "1,2o", "C": ""},
+            "; 1 more of 3 stones are wrong, as .*: x is empty; --keep-going takes the rest$",
+        ),
+    ],
+)
+def test_a_stone_that_is_wrong_is_told_with_the_others(tmp_path, spoilt, words):
+    corners = [("0", "0"), ("0,5", "0"), ("0,5", "0,3"), ("0", "0,3")]
+    rows = [f"{code};{x};0;{z};0,4" for code in "ABC" for x, z in corners[:3]]
+    rows += [f"{code};{spoilt.get(code, '0')};0;0,3;0,4" for code in "ABC"]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Stein;x;y;z;Tiefe", *rows]))
+    with pytest.raises(SurveyError, match=words):
+        ingest([path], f"sqlite:///{tmp_path}/a.db", "csv")
