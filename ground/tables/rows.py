@@ -319,7 +319,7 @@ def _filled(rows: Sequence[Sequence[Any]]) -> list[tuple[int, list[str]]]:
 
 
 def cell_text(cell: Any) -> str:
-    """Return a cell as text; whole numbers without decimals, numbers without marks between thousands, nothing for None."""
+    """Return a cell as text; numbers without decimals that are whole, or marks between thousands; nothing for None."""
     if cell is None:
         return ""
     if isinstance(cell, float):
