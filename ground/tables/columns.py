@@ -19,6 +19,7 @@ __all__ = [
     "UNITS",
     "length_scale",
     "length_unit",
+    "meaning_of",
     "places_of",
     "plain",
     "spellings",
@@ -111,6 +112,26 @@ def unit_of(name: str) -> tuple[str, str | None]:
     return (match["name"].strip(), unit_name) if unit_name is not None else (name.strip(), None)
 
 
+def meaning_of(name: str, meanings: Mapping[str, str]) -> str | None:
+    """Return what a column is by its name, without its unit or with it, or before a slash; None if it is not known.
+
+    Parameters
+    ----------
+    name : of the column, ``X/Easting (m)``
+    meanings : what columns are by the plain spelling of their names
+
+    Examples
+    --------
+    >>> [meaning_of(name, {"x": "x", "sigmax": "sx"}) for name in ("x [mm]", "X/Easting", "Sigma_X/Easting_(m)", "k/x")]
+    ['x', 'x', 'sx', None]
+    """
+    bare = _BRACKETS.sub("", unit_of(name)[0])
+    for spelling in (bare, name, bare.partition("/")[0]):
+        if (meaning := meanings.get(plain(spelling))) is not None:
+            return meaning
+    return None
+
+
 def spellings(name: str) -> Iterable[str]:
     """Yield the plain forms of a name, with umlauts as one letter and as two."""
     yield plain(name)
@@ -165,7 +186,7 @@ def places_of(
     }
     places: dict[str, int] = {}
     for k, name in enumerate(names):
-        what = known.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or known.get(plain(name))
+        what = meaning_of(name, known)
         if what is None:
             continue
         if what in places:

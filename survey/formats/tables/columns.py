@@ -11,7 +11,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ground.errors import SurveyError, UsageError
-from ground.tables.columns import COORDINATES, POINT, SIGMA, length_scale, plain, spellings, unit_of
+from ground.tables.columns import (
+    COORDINATES,
+    POINT,
+    SIGMA,
+    length_scale,
+    meaning_of,
+    plain,
+    spellings,
+    unit_of,
+)
 from ground.tables.numbers import shown
 
 __all__ = [
@@ -104,7 +113,6 @@ ALIASES: Mapping[str, Sequence[str]] = {
 
 _FALLBACK = ("name", "description")  # of the stone, if it has no column of its own: `ID`, `Nr`, `Code`
 _LENGTHS = ("x", "y", "z", "sigma", "depth", "depth_sigma")
-_BRACKETS = re.compile(r"[\[(][^\])]*[\])]")
 _MISSPELT = (
     *("course", "depth", "depth sigma", "depth source", "sigma", "station", "Tiefe", "Schicht", "profondeur"),
     *("profondità", "profundidad", "assise", "filare", "hilada"),
@@ -244,7 +252,7 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
 
 def kind_of_column(name: str) -> str | None:
     """Return what a column of this name is; None if it is not known."""
-    return _MEANINGS.get(plain(_BRACKETS.sub("", unit_of(name)[0]))) or _MEANINGS.get(plain(name))
+    return meaning_of(name, _MEANINGS)
 
 
 def _mine(names: Sequence[str], column_map: ColumnMap, where: str) -> tuple[dict[str, int], tuple[int, ...]]:

@@ -5,6 +5,7 @@ Adjustment Toolbox reads them: number, name, X, Y, Z and, if the place is not fi
 three) or its covariance (nine, row by row). The name may be left out.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ground.errors import SurveyError
-from ground.tables.columns import COORDINATES, POINT, SIGMA, length_scale
+from ground.tables.columns import COORDINATES, POINT, SIGMA, length_scale, plain, unit_of
 from ground.tables.grids import exchanged_grid
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.table import Table, TableRow, read_table
@@ -31,6 +32,15 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
         for a in "xyz"
     },
 }
+_GEOGRAPHIC = (
+    ("longitude", "latitude"),
+    ("lon", "lat"),
+    ("long", "lat"),
+    ("lng", "lat"),
+    ("länge", "breite"),
+)
+_RESULTS = re.compile(r"(error|residual|estimate|enable).*|.*(error|residual|est|estimated)")
+"""Names of columns of a result: errors and adjusted places are no standard deviations."""
 _REMEDY = "write: number, name, X, Y, Z, and deviations: none, one, three, or nine covariances, with commas"
 # mean offset between two lists of the same points over its spread, from which it is a shift of the origin
 _MAX_SHIFT = 10.0
@@ -66,6 +76,7 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
     """
     table = read_table(path, _is_row, _REMEDY)
     table.check_titles(_REMEDY)
+    _check_degrees(table)
     header, places = table.columns(_COLUMNS, least=3)
     if header is not None and header in table.comments and not _fits(table, places):
         header = None  # a comment that names fewer columns than there are
@@ -84,6 +95,18 @@ def read_control(path: Path) -> tuple[ControlRow, ...]:
         rows[row.number] = row
     _check_grid(table, tuple(rows.values()), header)
     return tuple(rows.values())
+
+
+def _check_degrees(table: Table) -> None:
+    """Refuse control points whose columns are named longitude and latitude."""
+    for header in (*table.titles, *table.comments):
+        names = {plain(unit_of(cell.partition("/")[0])[0]) for cell in header.cells}
+        if any({plain(name) for name in pair} <= names for pair in _GEOGRAPHIC):
+            raise SurveyError(
+                "its columns are longitudes and latitudes",
+                where=table.where(header.line),
+                remedy="export control points in a projected system in metres; XML of Metashape may have degrees",
+            )
 
 
 def _check_grid(table: Table, rows: Sequence[ControlRow], header: TableRow | None) -> None:
@@ -149,9 +172,13 @@ def _by_name(table: Table, row: TableRow, header: TableRow, places: Mapping[str,
         if k < len(row.cells) and row.cells[k].lower() not in ("", *EMPTY)
     }
     rest = [
-        k for k in range(len(row.cells)) if k not in places.values() and is_number(row.cells[k], table.commas)
+        k
+        for k in range(len(row.cells))
+        if k not in places.values()
+        and is_number(row.cells[k], table.commas)
+        and not (k < len(header.cells) and _RESULTS.fullmatch(plain(unit_of(header.cells[k])[0])))
     ]
-    if rest and not commented:
+    if rest and not (commented and len(header.cells) < len(row.cells)):
         name = header.cells[rest[0]] if rest[0] < len(header.cells) else ""
         raise SurveyError(
             f"column {shown(name)} is not known",

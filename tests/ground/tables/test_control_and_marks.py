@@ -103,3 +103,61 @@ def test_marks_in_millimetres_or_without_a_photograph_are_refused(tmp_path):
         SurveyError, match="the photograph of a mark is a date, 1-Jan; format the column as text"
     ):
         read_marks(path)
+
+
+METASHAPE = """# CoordinateSystem: LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0]]
+#Label,X/Easting,Y/Northing,Z/Altitude,Accuracy_X/Easting_(m),Accuracy_Y/Northing_(m),Accuracy_Z/Altitude_(m){more}
+target 1,2683401.2,1248077.9,408.55,0.005,0.006,0.01{values}
+target 2,2683404.1,1248073.3,408.75,0.005,0.006,0.01{values}
+# Total Error,,,,,,,0.0031
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "values"),
+    [
+        ("", ""),
+        (",Error_(m),X_error,Y_error,Z_error,X_est,Y_est,Z_est", ",0.0031,0.001,0.002,-0.001,1.0,2.0,3.0"),
+        (",Error_(m),Enable", ",0.0031,1"),
+    ],
+)
+def test_markers_as_metashape_exports_its_reference(tmp_path, more, values):
+    first, second = control(tmp_path, METASHAPE.format(more=more, values=values))
+    assert (first.number, second.number) == ("target 1", "target 2")
+    np.testing.assert_allclose(first.place, [2683401.2, 1248077.9, 408.55], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.diag(first.covariance)), [0.005, 0.006, 0.01], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "names", ["#Label,Longitude,Latitude,Altitude", "id,lon,lat,h", "Name,Breite,Länge,Höhe"]
+)
+def test_control_in_degrees_is_refused(tmp_path, names):
+    with pytest.raises(SurveyError, match=r"longitudes and latitudes; export .* in a projected system"):
+        control(tmp_path, f"{names}\nT1,8.52,47.38,408.55\nT2,8.53,47.38,409.55\n")
+
+
+def test_a_column_that_a_comment_names_and_nobody_knows_is_no_deviation(tmp_path):
+    with pytest.raises(SurveyError, match="column 'weight' is not known"):
+        control(tmp_path, "# name,x,y,z,weight\nT1,1.5,2.5,3.5,4\n")
+    (row,) = control(tmp_path, "# name,x,y,z\nT1,1.5,2.5,3.5,0.004\n")
+    assert row.covariance[0, 0] == pytest.approx(0.004**2)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "#cameraName,markerName,x,y,reprojError",
+        "Image name;Marker;x;y;rms",
+        "# file name, gcp name, x [px], y [px], weight",
+    ],
+)
+def test_only_a_column_of_that_name_holds_deviations_of_marks(tmp_path, names):
+    mark = ";" if ";" in names else ","
+    path = tmp_path / "marks.csv"
+    path.write_text(
+        "\n".join([names, *(mark.join((f"D{k}.JPG", "g0", "12.5", "8.5", "0.3")) for k in (1, 2))])
+    )
+    rows = read_marks(path)
+    assert [(row.photo, row.point, row.x, row.y, row.sigma) for row in rows] == [
+        (f"D{k}.JPG", "g0", 12.5, 8.5, None) for k in (1, 2)
+    ]
