@@ -359,10 +359,9 @@ def _no_plane(fitted: _Fitted, outline: PlacedOutline, options: CloudOptions) ->
     count = int(fitted.numbers[3])
     if fitted.status == FEW:
         what = f"too few points: {count} within its outline and {options.slab:g} m of its plane"
-        remedy = (
-            "check its place, or scan it; if it stands out of the wall or lies behind it, give a wider slab, e.g. "
-            "--slab 0.5; margins are set with --margin"
-        )
+        remedy = "check its place, or scan it; margins are set with --margin"
+        if not count:
+            remedy += f"; if it stands out of the wall, or lies behind it, give --slab {3.0 * options.slab:g}"
     elif fitted.status == COVERED:
         what = f"no plane: {count} points, most of which lie before or behind each other"
         remedy = "check the outline; something may cover the stone"

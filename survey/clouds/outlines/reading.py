@@ -15,7 +15,7 @@ from survey.clouds.outlines.labels import outlines_of, read_labels
 from survey.clouds.outlines.outline import Outline, WrongOutline, joined_names
 from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
 from survey.clouds.outlines.tracing import few_corners
-from survey.clouds.outlines.vector import read_vector
+from survey.clouds.outlines.vector import is_wkt_table, read_vector, read_wkt_table
 from survey.clouds.world import PixelPlace
 from survey.formats.fields import KIND
 from survey.formats.tables.kinds import kind_of
@@ -150,11 +150,16 @@ def _read(
         return _placed(path, *read_annotations(path, content, smooth, chosen, layer))
     if ending == ".json" and is_plain(content):
         return _scaled(Drawing(path, read_plain_json(path, content, chosen)), unit)
-    if ending in _TABLES and not _has_geometry(path):
+    as_text = ending in _TABLES and is_wkt_table(path, layer)
+    if ending in _TABLES and not as_text:
         outlines, names = read_table(path, chosen, unit, layer)
         return Drawing(path, outlines, names=names)
-    if ending in (*_VECTORS, ".csv"):
-        features, names = read_vector(path, layer, chosen, unit is not None)
+    if as_text or ending in _VECTORS:
+        features, names = (
+            read_wkt_table(path, chosen, layer, unit is not None)
+            if as_text
+            else read_vector(path, layer, chosen, unit is not None)
+        )
         sound = tuple(feature for feature in features if isinstance(feature, Outline))
         wrong = tuple(feature for feature in features if isinstance(feature, WrongOutline))
         return _scaled(Drawing(path, sound, wrong=wrong, names=names), unit)
@@ -167,13 +172,6 @@ def _read(
         where=str(path),
         remedy=f"outlines are read from {known} and the .json of COCO, labelme and VIA",
     )
-
-
-def _has_geometry(path: Path) -> bool:
-    """Return whether a table has outlines as well-known text, in the column that GDAL writes first."""
-    with path.open("rb") as file:
-        first = file.readline(1000).removeprefix(b"\xef\xbb\xbf").lstrip(b'"').upper()
-    return path.suffix.lower() == ".csv" and first.startswith(b"WKT")
 
 
 def _scaled(drawing: Drawing, unit: float | None) -> Drawing:

@@ -1,13 +1,14 @@
-"""Outlines in GeoPackage, GeoJSON, Shapefile and other vector formats of GDAL, read with pyogrio and shapely."""
+"""Outlines in vector formats of GDAL, read with pyogrio, and in tables as well-known text; both with shapely."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ground.errors import SurveyError, UsageError
+from ground.tables import table as tables
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import (
@@ -17,8 +18,9 @@ from survey.clouds.outlines.outline import (
     attributes_of,
     made_code,
 )
+from survey.formats.tables.wkt import is_wkt
 
-__all__ = ["read_vector"]
+__all__ = ["is_wkt_table", "read_vector", "read_wkt_table"]
 
 _DEGREES = 1e-3  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
 _PIXELS = 30.0  # width of the usual outline from which it is of pixels: no stone is 30 m wide
@@ -69,19 +71,63 @@ def read_vector(
         what = f"cannot be read: {' '.join(str(error).split())[:120]}"
         raise SurveyError(what, where=str(path), remedy="export it again, e.g. as GeoPackage") from error
     names = [str(name) for name in meta["fields"]]
+    values = [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)] or [{}] * len(fids)
+    wheres = [f"{path}, feature {int(fid)}" for fid in fids]
     shapes = shapely.from_wkb(geometries, on_invalid="fix")
+    return _features(path, shapes, fids, values, wheres, chosen, scaled), tuple(names)
+
+
+def is_wkt_table(path: Path, sheet: str | None) -> bool:
+    """Return whether a table has an outline as well-known text in a field of each row."""
+    try:
+        table = tables.read_table(path, _is_row, "", sheet)
+    except SurveyError:
+        return False
+    return bool(table.names)
+
+
+def read_wkt_table(
+    path: Path, chosen: Mapping[str, str], sheet: str | None, scaled: bool = False
+) -> tuple[tuple[Outline | WrongOutline, ...], tuple[str, ...]]:
+    """Read the outlines of a table, one in each row, in any column; otherwise as `read_vector`."""
+    shapely = optional("shapely", "outlines as well-known text")
+    table = tables.read_table(path, _is_row, "", sheet)
+    at = next(k for k, cell in enumerate(table.rows[0].cells) if is_wkt(cell))
+    names = tuple(name for k, name in enumerate(table.names) if k != at and name)
+    values, texts, wheres = [], [], []
+    for row in table.rows:
+        cells = [*row.cells, *[""] * (len(table.names) - len(row.cells))]
+        texts.append(cells[at] or None)
+        values.append({name: cell for name, cell in zip(table.names, cells, strict=False) if name in names})
+        wheres.append(table.where(row.line))
+    shapes = shapely.from_wkt(texts, on_invalid="fix")
+    numbers = range(1, len(texts) + 1)
+    return _features(path, shapes, numbers, values, wheres, chosen, scaled), names
+
+
+def _is_row(cells: Sequence[str], commas: bool) -> bool:
+    return any(map(is_wkt, cells))
+
+
+def _features(
+    path: Path,
+    shapes: Any,
+    fids: Sequence[int],
+    values: Sequence[Mapping[str, Any]],
+    wheres: Sequence[str],
+    chosen: Mapping[str, str],
+    scaled: bool,
+) -> tuple[Outline | WrongOutline, ...]:
+    """Make outlines of shapes with their attributes."""
+    shapely = optional("shapely", f"{path.suffix} files")
     bounds = shapely.bounds(shapes)
     _check_degrees(path, bounds)
     if not scaled:
         _check_pixels(path, bounds)
-    out = []
-    for k, shape in enumerate(shapes):
-        where = f"{path}, feature {int(fids[k])}"
-        attributes = attributes_of(
-            {name: column[k] for name, column in zip(names, columns, strict=True)}, chosen, where
-        )
-        out.append(_outline(k + 1, int(fids[k]), shape, attributes, where))
-    return tuple(out), tuple(names)
+    return tuple(
+        _outline(k + 1, int(fids[k]), shape, attributes_of(values[k], chosen, wheres[k]), wheres[k])
+        for k, shape in enumerate(shapes)
+    )
 
 
 def _check_degrees(path: Path, bounds: Array) -> None:

@@ -2,11 +2,12 @@
 
 LandXML: ``CgPoint`` with northing, easting and elevation, in the linear unit of ``Units``; the description is its
 ``code``, else ``desc``, else its name. JobXML: the reduced points (``Reductions/Point``), else those of the field book
-with a ``Grid``; metres; deleted ones are passed over, and points of instrument stations are stations. Files are read
-piece by piece.
+with a ``Grid``; metres; deleted ones are passed over, and points of instrument stations are stations. Where the code is
+that of a feature, the values of its attributes follow it in the description: "MASONRY 12-3 E". Files are read piece by
+piece.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from xml.parsers import expat
 
@@ -31,6 +32,7 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     collector = PointCollector(path, options, unique=False)
     unit = [options.scale]
     count = [0]
+    values: list[str] = []
 
     def element(where: str, attributes: Mapping[str, str], text: str, line: int) -> None:
         name = where.rpartition("/")[2]
@@ -39,6 +41,8 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
             if linear not in _LINEAR:
                 raise collector.fail(line, f"unknown linear unit {shown(linear)}", "export in metres")
             unit[0] = _LINEAR[linear]
+        elif name == "Property":
+            values.append(attributes.get("value", "").strip())
         elif name == "CgPoint" and text.strip():
             words = text.split()
             if len(words) != 3:
@@ -49,9 +53,9 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
             north, east, up = (unit[0] * parse_number(word, "coordinate", at) for word in words)
             number = attributes.get("name") or attributes.get("oID") or ""
             count[0] += 1
-            collector.add(
-                number, attributes.get("code") or attributes.get("desc") or number, (east, north, up), line
-            )
+            code = attributes.get("code") or attributes.get("desc") or number
+            collector.add(number, _described(collector, code, values), (east, north, up), line)
+            values.clear()
 
     _parse(path, element)
     return _stream(collector, path, count[0], "CgPoint")
@@ -64,12 +68,19 @@ def open_jobxml(path: Path, options: ReadingOptions | None = None) -> SurveyStre
     elements: dict[str, list[tuple[dict[str, str], int]]] = {"Point": [], "PointRecord": []}
     stations: set[str] = set()
     now: dict[str, str] = {}
+    values: list[str] = []
+    of_points: dict[str, list[str]] = {}  # values of attributes, which the field book alone may have
 
     def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:
         parent, _, name = where.rpartition("/")
         if name in elements and parent.rpartition("/")[2] in ("Reductions", "FieldBook"):
             elements[name].append((dict(now), line))
+            if values:
+                of_points[now.get("Name", "")] = list(values)
             now.clear()
+            values.clear()
+        elif where.endswith("Feature/Attribute/Value"):
+            values.append(text.strip())
         elif name == "StationRecord" and "StationName" in now:
             stations.add(now["StationName"])
             now.clear()
@@ -95,10 +106,15 @@ def open_jobxml(path: Path, options: ReadingOptions | None = None) -> SurveyStre
             collector.add_station(code_of(name) or name, (east, north, up), line)
             continue
         count += 1
-        collector.add(
-            name, attributes.get("Code") or attributes.get("Description1") or name, (east, north, up), line
-        )
+        code = attributes.get("Code") or attributes.get("Description1") or name
+        collector.add(name, _described(collector, code, of_points.get(name, ())), (east, north, up), line)
     return _stream(collector, path, count, "Point with a Grid")
+
+
+def _described(collector: PointCollector, code: str, values: Sequence[str]) -> str:
+    """Return the description of a point: its code, with the values of its attributes if it alone is not of the form."""
+    stated = [value for value in values if value]
+    return code if not stated or collector.template.parse(code) is not None else " ".join((code, *stated))
 
 
 def _stream(collector: PointCollector, path: Path, count: int, what: str) -> SurveyStream:

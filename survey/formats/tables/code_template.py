@@ -137,7 +137,10 @@ class CodeTemplate:
             rows = [row for row in rows if row not in words]
         else:
             words = {}
-        for text in _USUAL:
+        starts = {row.split()[0] for row in rows if row.strip()}
+        word = starts.pop() if len(starts) == 1 else ""  # the same before all is of no stone
+        before = f"{word} " if word and not any(map(str.isdigit, word)) else ""
+        for text in (*(before + text for text in _USUAL if before), *_USUAL):
             template = CodeTemplate(text, self._words)
             fields = [template.parse(row) for row in rows]
             if rows and text != self.text and _is_sensible(text, fields):

@@ -838,12 +838,15 @@ class _RowReader:
         if self._sigma_at is not None and (text := values[self._sigma_at]).lower() not in _UNKNOWN:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
         if identity.code in self._table.stones:
-            before = self._table.stones[identity.code].line
-            raise self._fail(
+            before = self._table.stones[identity.code]
+            error = self._fail(
                 number,
                 f"block {identity.code} a second time",
-                f"the first is on line {before}; draw one outline for each",
+                f"the first is on line {before.line}; draw one outline for each",
             )
+            if None not in (identity.course, before.course) and identity.course != before.course:
+                raise _AnotherCourseError(error.what, where=error.where, remedy=error.remedy)
+            raise error
         stone = self._stone_of(identity, values, number)
         for corner in corners.tolist():
             stone.add_place(True, (corner[0], corner[1], corner[2]), sigma, None)

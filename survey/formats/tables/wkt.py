@@ -8,7 +8,7 @@ from ground.errors import SurveyError
 from ground.tables.numbers import FARTHEST, shown
 from survey.arrays import Array
 
-__all__ = ["FLAT", "outline_of", "ring_of"]
+__all__ = ["FLAT", "is_wkt", "outline_of", "ring_of"]
 
 FLAT = (
     "export outlines with z (PolygonZ, 3D); outlines in the plane of a wall are read by --outlines FILE, with --depth "
@@ -21,6 +21,11 @@ _WKT = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 _RING = re.compile(r"\(([^()]*)\)")
+
+
+def is_wkt(text: str) -> bool:
+    """Return whether a text is an outline as well-known text."""
+    return _WKT.fullmatch(text) is not None
 
 
 def outline_of(text: str, where: str) -> Array:

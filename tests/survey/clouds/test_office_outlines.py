@@ -232,3 +232,20 @@ def test_a_kind_that_is_not_known_is_stated_as_the_message_says(tmp_path):
         read_outlines(path)
     (kinds,) = re.findall(r'--kinds "([^"]*)"', str(refused.value))
     assert {one.said.kind for one in read_outlines(path, kinds=read_kinds(kinds)).outlines} == {"ashlar"}
+
+
+@pytest.mark.parametrize("column", ["WKT", "wkt_geom", "Geometrie"])
+@pytest.mark.parametrize(("mark", "ending"), [(",", ".csv"), (";", ".csv"), ("\t", ".txt")])
+@pytest.mark.parametrize("last", [False, True])
+def test_well_known_text_stands_in_any_column(tmp_path, column, mark, ending, last):
+    rows = [["Stein", column]]
+    for code, ring in zip(CODES, rings(), strict=True):
+        places = ", ".join(f"{x} {y}" for x, y in [*ring, ring[0]])
+        rows.append([code, f'"MULTIPOLYGON ((({places})))"'])
+    path = tmp_path / f"a{ending}"
+    path.write_text("\n".join(mark.join(row if last else row[::-1]) for row in rows), encoding="utf-8-sig")
+    found = read_outlines(path).outlines
+    assert [one.code for one in found] == list(CODES)
+    assert [one.corners.tolist() for one in found] == [ring.tolist() for ring in rings()]
+    assert found[1].where == f"{path}:3"
+    assert not found[0].said.notes

@@ -1,6 +1,7 @@
 """Points and outlines in exchange formats, written here by their published specifications."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -227,3 +228,43 @@ def test_other_files_are_named_with_the_way_out(tmp_path, ending):
     with pytest.raises(UsageError, match="does not tell the format") as error:
         format_of(path)
     assert error.value.remedy == WAYS_OUT.get(ending, error.value.remedy)
+
+
+def of_features(jxl):
+    """Three stones, whose names, kinds and roles are attributes of a feature code."""
+    points, records = [], []
+    places = ((stone, corner) for stone in ("1-1", "1-2", "2-1") for corner in CORNERS)
+    for number, (stone, (role, x, y, z)) in enumerate(places, 1):
+        said = zip("abc", (stone, "Binder", "Ecke" if role == "v" else "Fläche"), strict=True)
+        coded = f"<Name>{number}</Name><Code>MAUER</Code>"
+        if jxl:
+            words = [f"<Attribute><Name>{n}</Name><Value>{v}</Value></Attribute>" for n, v in said]
+            feature = f"<Features><Feature Name='MAUER'>{''.join(words)}</Feature></Features>"
+            grid = f"<Grid><North>{y}</North><East>{x}</East><Elevation>{z}</Elevation></Grid>"
+            records.append(f"<PointRecord>{coded}{feature}</PointRecord>")
+            points.append(f"<Point>{coded}{grid}</Point>")
+        else:
+            words = [f'<Property label="{n}" value="{v}"/>' for n, v in said]
+            feature = f'<Feature code="MAUER">{"".join(words)}</Feature>'
+            points.append(f'<CgPoint name="{number}" code="MAUER">{y} {x} {z}{feature}</CgPoint>')
+    if jxl:
+        book = f"<FieldBook>{''.join(records)}</FieldBook>"
+        return f"<JOBFile>{book}<Reductions>{''.join(points)}</Reductions></JOBFile>"
+    return f"<LandXML><CgPoints>{''.join(points)}</CgPoints></LandXML>"
+
+
+@pytest.mark.parametrize(("name", "jxl"), [("a.jxl", True), ("a.landxml", False)])
+def test_attributes_of_a_feature_code_are_read_as_the_message_says(tmp_path, name, jxl):
+    path = tmp_path / name
+    path.write_text(of_features(jxl), encoding="utf-8")
+    with pytest.raises(SurveyError, match="'MAUER 1-1 Binder Ecke' is not of the form") as refused:
+        open_survey(path, format_of(path))
+    (codes,) = re.findall(r'--codes "([^"]*)"', str(refused.value))
+    assert codes == "MAUER {block} {kind} {role}"
+    stones = list(open_survey(path, format_of(path), ReadingOptions(codes=codes)).blocks)
+    assert [(one.code, one.kind, len(one.vertices), len(one.points)) for one in stones] == [
+        (code, "header", 3, 1) for code in ("1-1", "1-2", "2-1")
+    ]
+    path.write_text(of_features(jxl).replace("MAUER", "1-1:v"), encoding="utf-8")
+    (stone,) = open_survey(path, format_of(path)).blocks  # a code that fits has no need of attributes
+    assert len(stone.vertices) == 12
