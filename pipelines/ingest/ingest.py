@@ -300,7 +300,8 @@ def _of_known_kind(block: SurveyedBlock, path: str, known: set[str], worded: boo
         where = f"{path}:{record.line}: stone {block.code}"
         remedy = error.remedy
         if worded:
-            remedy = f'{remedy} Or say what it stands for, e.g. --kinds "{block.kind}=ashlar"'
+            asked = str(remedy).endswith("?")
+            remedy = f'{remedy}{" Or" if asked else "; or"} say what it stands for, e.g. --kinds "{block.kind}=ashlar"'
         return Reject(block.code, SurveyError(error.what, where=where, remedy=remedy), record.spans)
     known.add(block.kind)
     return block

@@ -25,6 +25,7 @@ _DARK, _WHITE = 32, 223  # of 255
 _SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
 _SMALLEST = 12  # pixels of the smallest piece that can be a stone
 _WALL_SHARE = 0.5  # share of a picture above which a piece is rather the wall than a stone
+_FEW_COLOURS = 8  # of a picture of classes, that a message lists
 _WHOLE = 0.95  # share of the largest piece above which the others are specks
 
 
@@ -86,7 +87,12 @@ def read_labels(path: Path, stones: str | None = None) -> Labels:
     flat = _colour_numbers(pixels) if colours else pixels
     values, numbers = _ranked(flat, path)
     if len(values) < 2 or values[0] != 0:
-        raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=_REMEDY)
+        listed = ", ".join(
+            f"#{value:06x}" if colours else str(value) for value in values[:_FEW_COLOURS].tolist()
+        )
+        few = len(values) <= _FEW_COLOURS
+        remedy = f"{_REMEDY}; or name that of the stones with --layer: {listed}" if few else _REMEDY
+        raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=remedy)
     check_stones(numbers, values, colours, path)
     return Labels(path, numbers, None if colours else values, 0, _SMALLEST, places)
 
@@ -155,13 +161,23 @@ def _pixels(path: Path) -> tuple[NDArray[Any], dict[int, tuple[float, ...]]]:
         with Image.open(path) as picture:
             tiff_tags = getattr(picture, "tag_v2", {})
             tags = {tag: tuple(tiff_tags[tag]) for tag in (33550, 33922, 34264) if tag in tiff_tags}
-            plain = {"RGBA": "RGB", "PA": "RGB", "CMYK": "RGB", "YCbCr": "RGB", "LA": "L"}.get(picture.mode)
+            if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
+                return _opaque(np.asarray(picture.convert("RGBA"))), tags
+            plain = {"CMYK": "RGB", "YCbCr": "RGB"}.get(picture.mode)
             return np.asarray(picture if plain is None else picture.convert(plain)), tags
     except (OSError, ValueError, SyntaxError) as error:
         what = f"cannot be read as a picture: {' '.join(str(error).split())[:120]}"
         raise SurveyError(what, where=str(path), remedy="save it as PNG or TIFF") from error
     finally:
         Image.MAX_IMAGE_PIXELS = limit
+
+
+def _opaque(pixels: NDArray[np.uint8]) -> NDArray[Any]:
+    """Return the colours of a picture (h, w, 4), black where it is transparent; of one colour alone, where it is."""
+    seen = pixels[..., 3] > 127
+    colours = np.where(seen[..., None], pixels[..., :3], np.uint8(0))
+    drawn = pixels[seen, :3]
+    return colours if seen.all() or not len(drawn) or (drawn != drawn[0]).any() else seen
 
 
 def _two_colours(pixels: NDArray[Any]) -> NDArray[np.bool_] | None:

@@ -11,6 +11,7 @@ import numpy as np
 from ground.errors import SurveyError, UsageError
 from ground.tables.columns import length_scale, plain, spellings, unit_of
 from survey.arrays import Array
+from survey.formats.fields import NO_COURSE
 from survey.formats.tables.columns import ALIASES
 from survey.records.survey import DEPTH_ORIGINS
 
@@ -179,10 +180,10 @@ def attributes_of(values: Mapping[str, Any], chosen: Mapping[str, str], where: s
     }
     if "zone" not in chosen and _is_measure(texts.get("zone")):
         del texts["zone"], columns["zone"]  # an area that a program computed
-    if (
-        "course" not in chosen
-        and plain(columns.get("course", "")) in _PLACES
-        and not _is_count(texts["course"])
+    word = texts.get("course")
+    if word is not None and (
+        word.casefold() in NO_COURSE
+        or ("course" not in chosen and plain(columns.get("course", "")) in _PLACES and not _is_count(word))
     ):
         del texts["course"], columns["course"]
     used = {*columns.values(), *_parts(columns.get("code", ""), values)}

@@ -74,6 +74,7 @@ class CodeFields:
     block : name of the stone; of the station, if that is its role
     kind, course, zone : of the stone; None if the template has no such field
     role : "vertex", "point" or "station"
+    counted : whether the role has a number
     """
 
     block: str
@@ -81,6 +82,7 @@ class CodeFields:
     course: int | None
     zone: str | None
     role: str
+    counted: bool = False
 
 
 class CodeTemplate:
@@ -90,6 +92,7 @@ class CodeTemplate:
     ----------
     text : the template
     roles : of points by words that are the user's own
+    numbered : whether roles may have numbers: v1, v2, p1
 
     Raises
     ------
@@ -97,8 +100,8 @@ class CodeTemplate:
         if it has no block, has an unknown field, or is ambiguous
     """
 
-    def __init__(self, text: str, roles: Mapping[str, str] | None = None) -> None:
-        self.text, self._words = text, roles or {}
+    def __init__(self, text: str, roles: Mapping[str, str] | None = None, numbered: bool = True) -> None:
+        self.text, self._words, self._counted = text, roles or {}, numbered
         self._roles = roles_with(self._words)
         parts = _FIELD.split(text.strip())
         self._literals = parts[::2]
@@ -127,6 +130,7 @@ class CodeTemplate:
             course=int(course) if course is not None and course.isdigit() else None,
             zone=fields.get("zone"),
             role=role_of(fields.get("role") or "v", self._roles) or "vertex",
+            counted=(fields.get("role") or "v")[-1].isdigit(),
         )
 
     def expected(self, description: str, others: Sequence[str]) -> str:
@@ -203,7 +207,7 @@ class CodeTemplate:
         free = "".join(
             re.escape(literal) for literal in sorted(literals) if not re.match(f"[{_CODE_LETTERS}]", literal)
         )
-        usual = {**_FIELDS, "role": _pattern_of_roles(self._words)}
+        usual = {**_FIELDS, "role": _pattern_of_roles(self._words, self._counted)}
         if self._numbered:
             marks = re.escape("".join(sorted(literals)))
             apart = rf"[^\W_][^\s{marks}]{{0,63}}", rf"^\s{marks}"
@@ -241,12 +245,13 @@ class CodeTemplate:
         return re.compile(pattern).fullmatch
 
 
-def _pattern_of_roles(own_words: Mapping[str, str]) -> tuple[str, str]:
+def _pattern_of_roles(own_words: Mapping[str, str], numbered: bool) -> tuple[str, str]:
     """Return the pattern of the words for roles, and their characters."""
     words = [word for word in {**ROLES, **own_words} if " " not in word]
     pattern = "|".join(sorted(map(re.escape, words), key=len, reverse=True))
     letters = re.escape("".join(sorted(set("".join(words)))))
-    return rf"(?i:{pattern})", letters + letters.upper()
+    number = "[0-9]{0,3}" if numbered else ""
+    return rf"(?i:{pattern}){number}", letters + letters.upper() + ("0-9" if numbered else "")
 
 
 def _fixed(name: str, width: int, numbered: bool) -> tuple[str, str]:
@@ -275,9 +280,9 @@ def _is_sensible(text: str, rows: Sequence[CodeFields | None]) -> bool:
         return False
     if "{course:2}" in text and not _are_counted(fields):
         return False
-    if (
-        "{role?}" in text or "{block}{role}" in text
-    ):  # the letter tells points from corners, and is none of the name
+    counted = any(row.counted for row in fields)  # or a name that ends so
+    # the letter tells points from corners, and is none of the name
+    if counted or "{role?}" in text or "{block}{role}" in text:
         return any(row.role == "point" and corners[row.block] for row in fields)
     return "{role}" in text or max(corners.values(), default=0) >= _CORNERS
 

@@ -9,6 +9,7 @@ import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 from ground.errors import SurveyError, UsageError
 from ground.tables.columns import (
@@ -60,6 +61,7 @@ ALIASES: Mapping[str, Sequence[str]] = {
     ),
     "role": (
         *("role", "point type", "point role", "point kind", "Rolle", "Punktart", "Punkttyp", "Punktrolle"),
+        *("type point", "type pt"),
         *("rôle", "type de point", "ruolo", "tipo punto", "tipo di punto", "rol", "papel", "tipo de punto"),
     ),
     **COORDINATES,
@@ -117,6 +119,7 @@ _MISSPELT = (
     *("course", "depth", "depth sigma", "depth source", "sigma", "station", "Tiefe", "Schicht", "profondeur"),
     *("profondità", "profundidad", "assise", "filare", "hilada"),
 )
+_FEWEST_CORNERS = 3  # of a face
 _ALIKE = 0.8  # similarity from which an unknown name is taken for a misspelt one
 
 
@@ -150,6 +153,7 @@ class Columns:
     scales : unit [m] of those that state one
     notes : place and name of the columns that are kept as notes
     joined : places of those that name a stone together, joined by hyphens in a further field; none: it has its own
+    corners : places of x, y and z of each corner, in a table with a row for each stone: x1, y1, z1, x2, …
     """
 
     count: int
@@ -157,6 +161,7 @@ class Columns:
     scales: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[tuple[int, str], ...] = ()
     joined: tuple[int, ...] = ()
+    corners: tuple[tuple[int, int, int], ...] = ()
 
 
 def read_map(text: str | None) -> ColumnMap:
@@ -220,9 +225,10 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
     scales: dict[str, float] = {}
     free: list[int] = []
     mine, joined = _mine(names, column_map, where)
-    taken = set(mine.values())
     for what, k in mine.items():
         _take(what, k, names, at, scales, where)
+    corners = () if {"x", "y", "z"} & mine.keys() else _corners(names)
+    taken = {*mine.values(), *chain(*corners)}
     for k, name in enumerate(names):
         if k in taken or not name or re.fullmatch(r"(?i)unnamed: \d+", name):
             continue
@@ -243,16 +249,31 @@ def find_columns(names: Sequence[str], column_map: ColumnMap, where: str, codes:
             )
         else:
             _take(kind, k, names, at, scales, where)
+    if corners:
+        at["outline"] = len(names)
+        for axis, k in zip("xyz", corners[0], strict=True):
+            if (scale := length_scale(names[k], where)) is not None:
+                scales[axis] = scale
     free += _fall_back(at, codes)
     _check_missing(names, at, where)
     for k in free:
         _check_spelling(names[k], at, where)
-    return Columns(len(names), at, scales, tuple((k, names[k]) for k in sorted(free)), joined)
+    return Columns(len(names), at, scales, tuple((k, names[k]) for k in sorted(free)), joined, corners)
 
 
 def kind_of_column(name: str) -> str | None:
     """Return what a column of this name is; None if it is not known."""
     return meaning_of(name, _MEANINGS)
+
+
+def _corners(names: Sequence[str]) -> tuple[tuple[int, int, int], ...]:
+    """Return the places of x, y and z of numbered corners, three at least, X1, Y1, Z1, X2, …; or nothing."""
+    places: dict[int, dict[str | None, int]] = {}
+    for k, name in enumerate(names):
+        if match := re.fullmatch(r"(.*\D)[ _]?([0-9]{1,2})", unit_of(name)[0]):
+            places.setdefault(int(match[2]), {})[kind_of_column(match[1])] = k
+    whole = [places[number] for number in sorted(places) if {"x", "y", "z"} <= places[number].keys()]
+    return tuple((one["x"], one["y"], one["z"]) for one in whole) if len(whole) >= _FEWEST_CORNERS else ()
 
 
 def _mine(names: Sequence[str], column_map: ColumnMap, where: str) -> tuple[dict[str, int], tuple[int, ...]]:

@@ -1,13 +1,13 @@
 """Reading of the rows beneath the names of columns: units, roles by their values, numbers taken for stones."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from ground.errors import SurveyError
-from ground.tables.columns import UNITS, length_unit
+from ground.tables.columns import UNITS, length_unit, plain
 from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import ListRows, TextRows
 from survey.formats.tables.code_template import CodeTemplate
@@ -23,6 +23,7 @@ _ROLE_WORDS = frozenset(
     role for role in ROLES if len(role) > 1 or role in "vp"
 )  # other letters may number points
 _OF_STONES = {"vertex", "point", STATION, CONTROL}
+_FEW_WORDS = 3  # unknown ones in a column of roles
 _FEWEST = 4  # rows from which a table of a stone for each row is one of points without stones
 _REPEATS = 3  # rows of a stone, at least
 _NO_CODE = "{block}:{role}:{kind}"  # a template beside which all usual ones are tried
@@ -66,9 +67,26 @@ def with_role(
             or {"vertex", "point"} <= {role_of(word, known_roles) for word in words[k]} <= _OF_STONES
         )
     ]
+    if not roles:
+        asked = {names[k]: words[k] for k in free if not {plain(names[k]), "*"} & column_map.ignored}
+        _check_words(rows.path, asked, known_roles)
     if len(roles) != 1:
         return column_map
     return replace(column_map, names={**column_map.names, "role": names[roles[0]]})
+
+
+def _check_words(path: str, columns: Mapping[str, Set[str]], roles: Mapping[str, str]) -> None:
+    """Ask for the words of a column of which some are roles of corners, and others none that is known."""
+    for name, words in columns.items():
+        unknown = sorted(word for word in words if role_of(word, roles) is None)
+        corners = [word for word in words if len(word) > 1 and roles.get(word) == "vertex"]
+        if corners and "" not in words and 0 < len(unknown) <= _FEW_WORDS:
+            pairs = ",".join(f"{word}=point" for word in unknown)
+            raise SurveyError(
+                f"column {shown(name)} holds {', '.join((*corners, *unknown))}: are these corners and other points?",
+                where=path,
+                remedy=f'if so, give --roles "{pairs}"; if not, --columns "ignore={name}"',
+            )
 
 
 def with_units(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns) -> tuple[int, Columns]:

@@ -22,7 +22,7 @@ from ground.tables.columns import plain
 from ground.tables.decimals import Decimals
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
-from survey.formats.fields import CODE, KIND, code_of, parse_course
+from survey.formats.fields import CODE, KIND, NO_COURSE, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.tables.axes import (
     ORDERS,
@@ -241,11 +241,11 @@ def _read(
     if not form and {"block", "course"} <= columns.at.keys() and not columns.joined:
         _check_numbers(rows.path, columns, names, collector.table.stones)
     if not form and "block" in columns.at and "outline" not in columns.at:
-        check_stones_repeat(rows.path, columns, names, collector.table.stones, options.columns)
         at = columns.at["block"]
         title = names[at] if at < len(names) else str(at + 1)
         if "description" in (kind_of_column(title), *read_map(options.columns).names):
             check_names(rows.path, title, collector.table.stones)
+        check_stones_repeat(rows.path, columns, names, collector.table.stones, options.columns)
     head = collector.head
     doubt = _order_remarks(rows, collector, columns, options, form, titles)
     remarks = (*rows.remarks, *reader.remarks, *collector.remarks, *doubt)
@@ -422,15 +422,17 @@ def _order_remarks(
 
 def _axis_names(rows: AnyRows, columns: Columns, titles: Sequence[tuple[int, Any]]) -> list[str]:
     """Return the names of the columns of x and y; none where they have none."""
-    if not titles or not {"x", "y"} <= set(columns.at):
+    if not titles or not ({"x", "y"} <= set(columns.at) or columns.corners):
         return []
     number, row = titles[-1]
     try:
         names = rows.cells(row, number)
     except SurveyError:
         return []
-    places = [columns.at["x"], columns.at["y"]]
-    return [names[k] for k in places] if max(places) < len(names) else []
+    places = columns.corners[0][:2] if columns.corners else (columns.at["x"], columns.at["y"])
+    if max(places) >= len(names):
+        return []
+    return [names[k].rstrip("0123456789") if columns.corners else names[k] for k in places]
 
 
 @dataclass(frozen=True, slots=True)
@@ -464,7 +466,9 @@ class PointCollector:
     def __init__(self, path: Path, options: ReadingOptions, unique: bool) -> None:
         self._path, self._options, self._unique = str(path), options, unique
         self.roles = roles_with(options.roles)
-        self.template = CodeTemplate(options.codes or CODES, options.roles)
+        self.template = CodeTemplate(
+            options.codes or CODES, options.roles, numbered=options.codes is not None
+        )
         self.table = PointTable(str(path), options.sigma, options.kind)
         self._head = options.head_for(path)
         self._known = {station.name: station for station in self._head.stations}
@@ -715,6 +719,7 @@ class _RowReader:
         )
         self._by = [column for column in _IDENTITY if column in at]
         self._outline_at = at.get("outline")
+        self._corners = [itemgetter(*places) for places in columns.corners]
         self._place = None if self._outline_at is not None else itemgetter(at["x"], at["y"], at["z"])
         self._name_at, self._sigma_at = at.get("name"), at.get("sigma")
         self._of_stones = [(column, at[column]) for column in _OF_STONES if column in at]
@@ -733,6 +738,10 @@ class _RowReader:
         self._name_of_rows = "" if headed else None
         if headed:
             self.remarks += ("rows without the name of a stone are of the stone above them",)
+
+    def _told(self, remark: str) -> None:
+        if remark not in self.remarks:
+            self.remarks += (remark,)
 
     def take(self, row: Any, number: int) -> None:
         """Read one row."""
@@ -796,8 +805,10 @@ class _RowReader:
             fields = self.collector.fields(cells["description"], number, name)
             block, kind = block or fields.block, kind or fields.kind
             course, zone, role = fields.course, fields.zone, fields.role
-        if cells.get("course"):
-            course = parse_course(cells["course"], f"{self._path}:{number}")
+        if (text := cells.get("course", "")).casefold() in NO_COURSE:
+            self._told(f"{text!r} is no number of a course; stones with it have none")
+        elif text:
+            course = parse_course(text, f"{self._path}:{number}")
         if "role" in cells:
             stated = role_of(cells["role"], self.collector.roles)
             if stated is None:
@@ -833,7 +844,12 @@ class _RowReader:
         stone.add_line(number, count)
 
     def _add_outline(self, identity: _Identity, values: Sequence[str], number: int, count: int) -> None:
-        corners = self._options.scale * outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
+        if self._corners:
+            texts = [place for pick in self._corners if any(place := pick(values))]
+            corners = np.array([self._decimals.place(place, "xyz", number) for place in texts])
+        else:
+            outline = outline_of(values[self._outline_at or 0], f"{self._path}:{number}")
+            corners = self._options.scale * outline
         sigma = _NOTHING
         if self._sigma_at is not None and (text := values[self._sigma_at]).lower() not in _UNKNOWN:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])

@@ -21,6 +21,7 @@ ROLES: Mapping[str, str] = {
     **dict.fromkeys(("b", "beg", "begin", "start", "l", "line", "end", "c", "cls", "close"), "vertex"),
     **dict.fromkeys(("p", "point", "pt", "face", "surface", "f", "punkt", "fläche", "flaeche"), "point"),
     **dict.fromkeys(("flächenpunkt", "face point", "punto", "superficie", "faccia", "cara", "fl", "flp"), "point"),
+    **dict.fromkeys(("parement", "intérieur", "inside", "innen", "interno", "interior"), "point"),
     **dict.fromkeys(("m", "mitte", "middle", "centre", "center", "milieu", "mezzo", "centro"), "point"),
     **dict.fromkeys(("s", "st", "stn", "stp", "station", "standpunkt", "stazione", "estación"), STATION),
 }  # fmt: skip

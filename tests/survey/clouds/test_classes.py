@@ -124,3 +124,27 @@ def test_smoothed_edges_between_black_and_white_are_read(tmp_path, black_stones,
     assert len(found) == count
     sides = np.array([np.ptp(one.corners, axis=0) for one in found])
     assert np.abs(sides - 2.5 * STONE).max() < 2.5
+
+
+@pytest.mark.parametrize("hidden", [(255, 255, 255), (0, 0, 0), (12, 200, 30)])
+@pytest.mark.parametrize("colours", [1, 20])
+def test_what_is_transparent_is_mortar_whatever_colour_it_hides(tmp_path, hidden, colours):
+    stones = bricks()
+    pixels = np.zeros((*stones.shape, 4), np.uint8)
+    pixels[..., :3] = hidden
+    seen = stones > 0
+    pixels[seen, 0], pixels[seen, 1], pixels[seen, 2] = 0, 0, (stones[seen] % colours) * 10
+    pixels[seen, 3] = 255
+    if colours > 1:
+        pixels[seen, 1] = 90
+    path = saved(pixels, tmp_path / "a.png")
+    assert len(read_outlines(path).outlines) == ROWS * COLUMNS
+
+
+def test_the_colours_of_a_line_drawing_are_listed(tmp_path):
+    pixels = np.full((TALL, WIDE, 3), (200, 0, 0), np.uint8)
+    pixels[bricks() > 0] = 255
+    path = saved(pixels, tmp_path / "a.png")
+    with pytest.raises(SurveyError, match=r"no 0 among them.*--layer: #c80000, #ffffff"):
+        read_outlines(path)
+    assert len(read_outlines(path, layer="#ffffff").outlines) == ROWS * COLUMNS

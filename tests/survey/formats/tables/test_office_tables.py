@@ -1,6 +1,7 @@
 """Tables and lists as offices deliver them: rows of units, two columns of kinds, codes, numbers of points."""
 
 import re
+from itertools import chain
 
 import pytest
 
@@ -315,3 +316,91 @@ def test_a_text_with_clear_names_of_columns_needs_no_format(tmp_path, ending):
     unclear = table(tmp_path / f"b{ending}", ["Stein", "Rolle", "x", "y", "z"], cells)
     with pytest.raises(UsageError, match="does not tell the format"):
         format_of(unclear)
+
+
+@pytest.mark.parametrize("word", ["Bogen", "arc", "Arco"])
+def test_stones_of_an_arch_have_no_course(tmp_path, word):
+    cells = [
+        [code, word if code == "02-2" else code[1], role, *map(str, place)] for code, role, *place in POINTS
+    ]
+    stream = open_csv(table(tmp_path / "a.csv", ["Stein", "Lage", "Rolle", "x", "y", "z"], cells))
+    assert [one.course for one in stream.blocks] == [1, 1, 2, None]
+    assert any(word in remark for remark in stream.remarks)
+
+
+@pytest.mark.parametrize(
+    ("written", "template"),
+    [("N-C{course}-S{number}-{role}", "{block}-{role}"), ("N{course}.{number} {role}", "{block} {role}")],
+)
+def test_roles_of_codes_may_be_numbered(tmp_path, written, template):
+    cells = []
+    for k, (code, role, *place) in enumerate(POINTS):
+        course, number = code.split("-")
+        numbered = f"{'v' if role == 'E' else 'f'}{k % 6 + 1}"
+        text = written.format(course=course, number=number, role=numbered)
+        cells.append([str(k), *map(str, place), text])
+    path = table(tmp_path / "a.csv", ["Pt", "East", "North", "Elev", "Code"], cells)
+    for reading in (open_penzd, open_csv):
+        with pytest.raises(SurveyError) as refused:
+            reading(path)
+        (codes,) = re.findall(r'--codes "([^"]*)"', str(refused.value))
+        assert codes == template
+        stones = list(reading(path, ReadingOptions(codes=codes)).blocks)
+        assert [(len(one.vertices), len(one.points)) for one in stones] == [(4, 2)] * 4
+
+
+def test_what_ends_a_name_is_no_numbered_role(tmp_path):
+    cells = [[str(k), *map(str, place), f"N-{code}-B7"] for k, (code, _, *place) in enumerate(POINTS)]
+    with pytest.raises(SurveyError, match=r'--codes "\{block\}"'):
+        open_penzd(table(tmp_path / "a.csv", ["Pt", "East", "North", "Elev", "Code"], cells))
+
+
+@pytest.mark.parametrize(
+    ("names", "scale"),
+    [("X{k};Y{k};Z{k}", 1.0), ("Est {k} [cm];Nord {k} [cm];Alt {k} [cm]", 100.0), ("x_{k};y_{k};z_{k}", 1.0)],
+)
+def test_a_row_for_each_stone_has_numbered_corners(tmp_path, names, scale):
+    corners = {code: [] for code in FACES}
+    for code, role, *place in POINTS:
+        if role == "E":
+            corners[code].append([f"{scale * value:.4f}".replace(".", ",") for value in place])
+    corners["02-2"].pop()  # a triangle
+    cells = [[code, "9", *chain(*places), *[""] * 3 * (5 - len(places))] for code, places in corners.items()]
+    titles = ";".join(names.format(k=k) for k in range(1, 6)).split(";")
+    stones = list(open_csv(table(tmp_path / "a.csv", ["Stein", "Lage", *titles], cells)).blocks)
+    assert [len(one.vertices) for one in stones] == [4, 4, 4, 3]
+    assert stones[1].vertices[1].tolist() == pytest.approx([1.7, 0.001, 0.35], abs=2e-4)
+    assert {one.course for one in stones} == {9}
+
+
+@pytest.mark.parametrize(("corner", "face"), [("sommet", "doucine"), ("Ecke", "Bosse"), ("corner", "boss")])
+def test_a_column_of_which_some_words_are_roles_is_asked_about(tmp_path, corner, face):
+    cells = [[code, corner if role == "E" else face, *map(str, place)] for code, role, *place in POINTS]
+    path = table(tmp_path / "a.csv", ["Stein", "Objekt", "x", "y", "z"], cells)
+    with pytest.raises(SurveyError, match="corners and other points") as refused:
+        open_csv(path)
+    roles, columns = re.findall(r'--(?:roles|columns) "([^"]*)"', str(refused.value))
+    assert {code: one[:2] for code, one in read(path, roles=read_roles(roles)).items()} == FACES
+    assert {code: one[:2] for code, one in read(path, columns=columns).items()} == dict.fromkeys(
+        FACES, (6, 0)
+    )
+
+
+def test_numbered_corners_of_a_national_grid_are_asked_about_their_axes(tmp_path):
+    cells = [
+        [
+            "1",
+            *chain(
+                *(
+                    (f"{5411000 + x}", f"{431000 + y}", f"{z}")
+                    for x, y, z in [(0, 0, 0), (1, 0, 0), (1, 0, 1)]
+                )
+            ),
+        ]
+    ]
+    names = [f"{axis}{k}" for k in (1, 2, 3) for axis in "XYZ"]
+    with pytest.raises(SurveyError, match="northing"):
+        open_csv(table(tmp_path / "a.csv", ["Stein", *names], cells))
+    clear = [f"{axis}{k}" for k in (1, 2, 3) for axis in ("Nord", "Ost", "Höhe")]
+    (stone,) = open_csv(table(tmp_path / "b.csv", ["Stein", *clear], cells)).blocks
+    assert stone.vertices[1].tolist() == [431000, 5411001, 0]
