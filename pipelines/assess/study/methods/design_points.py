@@ -2,12 +2,17 @@
 
 Where stones may fall in several ways there are several. The search begins at the mean first, and then from points along
 each of the largest unknowns.
+
+Where g is larger at the next point than the tangent says, failure asks for more than one tangent: two states must be
+lost at once, or the limit state is curved towards the mean. So tangents are kept until a point fails, and the next
+point is the nearest to the mean in which all of them fail; the iteration would else go to and fro between two states.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.stats import norm
 
 from mechanics.arrays import Array
@@ -63,10 +68,38 @@ class Design:
         return squares / (float(squares.sum()) or 1.0)
 
 
+@dataclass(frozen=True)
+class _Tangent:
+    """Tangent of g at a point (n,).
+
+    Attributes
+    ----------
+    point : where it touches
+    gradient : (n,) of g there
+    state : g there
+    """
+
+    point: Array
+    gradient: Array
+    state: float
+
+    @property
+    def distance(self) -> float:
+        """Distance of the point from where the tangent is zero, negative where it fails."""
+        return self.state / float(np.linalg.norm(self.gradient))
+
+    @property
+    def goal(self) -> Array:
+        """Point (n,) nearest to the mean at which the tangent is zero."""
+        square = float(self.gradient @ self.gradient)
+        nearest: Array = (float(self.gradient @ self.point) - self.state) / square * self.gradient
+        return nearest
+
+
 def design_point(evaluate: Evaluate, failure: Failure, start: Array) -> Design | None:
     """Return the design point that a search from a start (n,) comes to; None where there is no gradient."""
     point, previous = start.copy(), None
-    last: tuple[Array, Array, float] | None = None
+    tangents: list[_Tangent] = []
     used, scale = 0, 1.0
     while used < _MAX_SAMPLES:
         (sample,) = evaluate(point[None], gradient=True)
@@ -78,19 +111,21 @@ def design_point(evaluate: Evaluate, failure: Failure, start: Array) -> Design |
             # half of the way back to where there was one
             point = 0.5 * (point + previous)
             continue
-        slope = float(np.linalg.norm(gradient))
-        if last is not None:
+        tangent = _Tangent(point, gradient, state)
+        if tangents:
             # the iteration swings where the limit state is curved: shorter steps where g has not come down
-            worse = abs(state) / slope > 0.9 * abs(last[2]) / float(np.linalg.norm(last[1]))
-            swings = float((point - last[0]) @ (_next(*last) - last[0])) > 0.0 and worse
+            last = tangents[-1]
+            worse = abs(tangent.distance) > 0.9 * abs(last.distance)
+            swings = float((point - last.point) @ (last.goal - last.point)) > 0.0 and worse
             scale = max(0.5 * scale, 0.05) if swings else min(1.5 * scale, 1.0)
-        last = (point, gradient, state)
-        goal = _next(point, gradient, state)
+        tangents = [*(tangents if tangent.distance > -_STILL else []), tangent]
+        goal, gradient = _nearest(tangents)
         if float(np.linalg.norm(goal - point)) < _STILL * max(1.0, float(np.linalg.norm(goal))):
             return _designed(goal, gradient, True, used)
+        if len(tangents) > 1:
+            scale = 1.0
         previous, point = point, point + scale * (goal - point)
-    assert last is not None
-    return _designed(last[0], last[1], False, used)
+    return _designed(tangents[-1].point, tangents[-1].gradient, False, used)
 
 
 def design_points(
@@ -143,9 +178,29 @@ def _starts(along: Sequence[int], dimension: int) -> Sequence[Array]:
     return starts
 
 
-def _next(point: Array, gradient: Array, state: float) -> Array:
-    goal: Array = (float(gradient @ point) - state) / float(gradient @ gradient) * gradient
-    return goal
+def _nearest(tangents: list[_Tangent]) -> tuple[Array, Array]:
+    """Return the point nearest to the mean at which no tangent is above zero, and what stands for the gradient there.
+
+    A problem of least distance (Lawson & Hanson 1974, §23.4). Where tangents leave no such point, and where the mean
+    fails, the last decides.
+    """
+    last = tangents[-1]
+    if len(tangents) == 1:
+        return last.goal, last.gradient
+    slopes = np.array([np.linalg.norm(one.gradient) for one in tangents])
+    normals = -np.array([one.gradient for one in tangents]) / slopes[:, None]
+    reach = np.array([one.distance for one in tangents])
+    reach += np.einsum("ij,ij->i", normals, [one.point for one in tangents])
+    if reach[-1] <= 0.0:
+        return last.goal, last.gradient
+    system = np.vstack([normals.T, reach])
+    wanted = np.zeros(len(system))
+    wanted[-1] = 1.0
+    rest = system @ nnls(system, wanted)[0] - wanted
+    if abs(rest[-1]) <= _STILL**2:
+        return last.goal, last.gradient
+    goal: Array = -rest[:-1] / rest[-1]
+    return goal, -goal * slopes[-1] / np.linalg.norm(goal)
 
 
 def _designed(point: Array, gradient: Array, converged: bool, used: int) -> Design:

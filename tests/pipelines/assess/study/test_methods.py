@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import multivariate_normal, norm
 
 from pipelines.assess.study.inputs.distributions import Distribution
 from pipelines.assess.study.methods.counting import controlled, mean_of, probability
-from pipelines.assess.study.methods.design_points import design_points
+from pipelines.assess.study.methods.design_points import design_point, design_points
 from pipelines.assess.study.methods.failure import Failure
 from pipelines.assess.study.methods.first_order import first_order
 from pipelines.assess.study.methods.importance import importance
@@ -58,6 +58,45 @@ def test_form_and_importance_sampling_of_a_linear_limit_state(sigma, exact, inde
     assert samples.taken <= 1200
     assert found.cov <= 0.10
     assert found.low < exact < found.high
+
+
+@pytest.mark.parametrize("start", [0.0, -2.0])
+def test_two_states_that_must_be_lost_at_once_meet_in_one_design_point(start):
+    """Two planes at an angle of 120 degrees, at 2.0 and 2.5: the line in which they meet is at 5.204 from the mean."""
+    normals, apart = np.array([[1.0, 0.0], [-0.5, np.sqrt(0.75)]]), np.array([2.0, 2.5])
+    both = Function(
+        lambda u: (apart - normals @ u).max(), lambda u: -normals[int(np.argmax(apart - normals @ u))]
+    )
+    corner = np.linalg.solve(normals, apart)
+    found = design_point(both, FAILS, np.full(2, start))
+    assert found.converged
+    assert found.evaluations <= 6
+    assert found.point == pytest.approx(corner, abs=1e-6)
+    assert found.index == pytest.approx(np.linalg.norm(corner))
+    assert found.shares == pytest.approx(corner**2 / (corner @ corner))
+    taken = importance(both, [found], 2000, 1).probability(FAILS, 0.95)
+    exact = float(multivariate_normal(cov=[[1.0, -0.5], [-0.5, 1.0]]).cdf(-apart))
+    assert taken.low < exact < taken.high
+
+
+@pytest.mark.parametrize("curved", [0.3, 1.0])
+def test_a_limit_state_that_curves_towards_the_mean_takes_few_samples(curved):
+    """g = 2.5 - u1 + c u2²: shorter steps alone take 21 samples at times, and with c = 1 no 30 of them are enough."""
+    bowl = Function(
+        lambda u: 2.5 - u[0] + curved * u[1] ** 2, lambda u: np.array([-1.0, 2.0 * curved * u[1]])
+    )
+    for start in ((0.0, 0.0), (1.0, 2.0), (-2.0, 1.0)):
+        found = design_point(bowl, FAILS, np.array(start))
+        assert found.converged
+        assert found.evaluations <= 12
+        assert found.index == pytest.approx(2.5, abs=1e-3)
+
+
+def test_the_design_point_of_a_mean_that_fails_lies_on_the_way_back():
+    bowl = Function(lambda u: u[0] - 1.0 + 0.2 * u[1] ** 2, lambda u: np.array([1.0, 0.4 * u[1]]))
+    found = design_point(bowl, FAILS, np.array([2.0, 1.0]))
+    assert found.converged
+    assert found.index == pytest.approx(-1.0, abs=1e-2)
 
 
 def test_subset_simulation_reaches_small_probabilities():
