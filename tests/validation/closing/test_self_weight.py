@@ -113,11 +113,12 @@ def test_elastic_stones_bear_what_they_truly_bear(name):
 def test_what_rigid_stones_bear_is_not_unique_below_an_arch_in_a_wall():
     """The true wall, solved by two methods, which begin with the same zero: both are in balance with every step solved.
 
-    An interior point ends among all forces that hold the wall up, sweeps near where they began.
+    An interior point ends among all forces that hold the wall up, the usual chain near where they began. (Sweeps do not
+    solve most steps on some processors.)
     """
     building = wall(98, arch=ArchShape.SEMICIRCULAR)
     one, two = (
-        supported(building, building.solids, method=method) for method in (Method.NSGS, Method.INTERIOR_POINT)
+        supported(building, building.solids, method=method) for method in (Method.AUTO, Method.INTERIOR_POINT)
     )
     print(f"\nthe true wall, two ways: {100 * np.abs(one - two).max() / one.mean():.0f} % of the mean")
     assert np.abs(one - two).max() > 0.05 * one.mean()
