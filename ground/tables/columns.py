@@ -48,6 +48,7 @@ COORDINATES: Mapping[str, Sequence[str]] = {
     ),
     "z": (
         *("z", "elevation", "elev", "height", "h", "coord z", "z coord", "z coordinate", "pos z"),
+        *("Höhe ü M", "Höhe ü NN", "Höhe über NN", "Höhe NHN", "H ü M", "Kote", "altitude NGF", "quota slm"),
         *("Höhe", "z Koordinate", "z Wert", "Punkthöhe", "altitude", "alt", "hauteur", "coordonnée z"),
         *("quota", "altezza", "coordinata z", "cota", "altura", "elevación", "coordenada z", "point z"),
     ),
@@ -76,6 +77,10 @@ _UNIT = re.compile(
     re.IGNORECASE,
 )
 _BRACKETS = re.compile(r"[\[(][^\])]*[\])]")
+_ZEROS = frozenset(
+    ("um", "unn", "ubernn", "nn", "nhn", "unhn", "ngf", "slm", "snm", "asl", "amsl", "abovesealevel")
+)
+"""What heights are counted from, as it follows their unit: metres above the sea, in plain spelling."""
 _WORDS = {"metre": "m", "metres": "m", "meter": "m", "meters": "m", "millimeter": "mm", "centimeter": "cm"} | {
     "millimetre": "mm", "millimetres": "mm", "centimetre": "cm", "feet": "ft", "foot": "ft", "inch": "in",
     "inches": "in", '"': "in", "'": "ft", "us survey feet": "us-ft", "us survey foot": "us-ft", "ftus": "us-ft",
@@ -89,10 +94,17 @@ def plain(name: str) -> str:
     return "".join(character for character in folded if character.isalnum())
 
 
-def length_unit(text: str) -> str | None:
-    """Return the name in `UNITS` of a unit of length, however it is spelt; None if it is not known."""
+def length_unit(text: str, height: bool = False) -> str | None:
+    """Return the name in `UNITS` of a unit of length, however it is spelt; None if it is not known.
+
+    Of a height, what it is counted from may follow.
+
+    >>> length_unit("Metres"), length_unit("m ü. M.", height=True), length_unit("m ü. M."), length_unit("m/s")
+    ('m', 'm', None, None)
+    """
     bare = unicodedata.normalize("NFKC", text).strip().rstrip(".").casefold()
-    word = _WORDS.get(bare, bare)
+    unit, _, zero = bare.partition(" ")
+    word = _WORDS.get(bare, unit if height and plain(zero) in _ZEROS else bare)
     return word if word in UNITS else None
 
 
@@ -108,7 +120,7 @@ def unit_of(name: str) -> tuple[str, str | None]:
     if match is None:
         return name.strip(), None
     unit = match["a"] or match["b"] or match["c"] or ""
-    unit_name = length_unit(unit)
+    unit_name = length_unit(unit, plain(match["name"]) in _HEIGHTS)
     return (match["name"].strip(), unit_name) if unit_name is not None else (name.strip(), None)
 
 
@@ -158,6 +170,9 @@ def length_scale(name: str, where: str) -> float | None:
             remedy=f"units are {', '.join(UNITS)}",
         )
     return None
+
+
+_HEIGHTS = frozenset(spelling for name in COORDINATES["z"] for spelling in spellings(name))
 
 
 def places_of(

@@ -26,6 +26,7 @@ _UNITS = {
     14: 0.1, 15: 10.0, 16: 100.0, 21: _SURVEY_FOOT, 22: _SURVEY_FOOT / 12.0, 23: 3.0 * _SURVEY_FOOT,
 }  # fmt: skip
 """$INSUNITS: length of a unit [m]."""
+_LISTED = 6  # labels in a message
 _FRAMED = 3  # texts of other outlines within an outline that is no stone
 
 
@@ -77,13 +78,7 @@ def read_dxf(
     left = list(_left_out(entities, len(entities.curves) - len(drawn)))
     labels, around = _labelled(curves, texts)
     stones = [k for k, curve in enumerate(curves) if not curve.chained or _is_stone(k, labels, around, texts)]
-    if len(stones) < len(curves):
-        left.append(
-            (
-                "left out",
-                f"{len(curves) - len(stones)} closed curves of single lines, without a text of their own",
-            )
-        )
+    left += _astray(texts, labels, len(curves) - len(stones))
     return tuple(_coded(curves, stones, labels, around, chosen, kinds or {}, path)), tuple(left)
 
 
@@ -112,7 +107,7 @@ def _layers(named: str | None) -> frozenset[str]:
 
 
 def _without_symbols(curves: Sequence[Curve]) -> list[Curve]:
-    """Return the curves without those that inserted labels are drawn with: each stands in the outline of a stone.
+    """Return the curves without those that inserted labels are drawn with: most stand in the outline of a stone.
 
     A label may be the stone itself, with its number. Then a curve around it is that of no stone, and holds other
     labels too.
@@ -135,7 +130,26 @@ def _without_symbols(curves: Sequence[Curve]) -> list[Curve]:
     held: dict[int, set[int | None]] = {}
     for k, holder in around.items():
         held.setdefault(holder, set()).add(curves[k].label)
-    return [curve for k, curve in enumerate(curves) if k not in around or len(held[around[k]]) >= _FRAMED]
+    inside = {k for k, holder in around.items() if len(held[holder]) < _FRAMED}
+    of_blocks = Counter(curve.block for curve in curves if curve.label is not None)
+    symbols = Counter(curves[k].block for k in inside)
+    return [
+        curve
+        for k, curve in enumerate(curves)
+        if k not in inside and (curve.label is None or 2 * symbols[curve.block] <= of_blocks[curve.block])
+    ]
+
+
+def _astray(
+    texts: Sequence[DrawnText], labels: Mapping[int, Sequence[DrawnText]], unnamed: int
+) -> Iterator[tuple[str, str]]:
+    """Yield what was left out of curves of single lines, `unnamed` of which have no text, and labels of no stone."""
+    inside = {id(text) for some in labels.values() for text in some}
+    outside = [next(iter(text.values.values())) for text in texts if text.values and id(text) not in inside]
+    if outside:
+        yield "texts", f"{len(outside)} labels stand in no outline: {', '.join(outside[:_LISTED])}"
+    if unnamed:
+        yield "left out", f"{unnamed} closed curves of single lines, without a text of their own"
 
 
 def _empty(path: Path, layer: str | None, entities: Entities) -> SurveyError:

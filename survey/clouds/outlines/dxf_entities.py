@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
@@ -33,6 +33,7 @@ class Curve:
     layer : its layer; in a block on layer 0, that of the insert
     where : kind, handle and layer, for messages
     label : number of the inserted label whose block it is of; None if of none
+    block : name of that block; None if of none
     chained : whether it was drawn as single lines that meet at their ends
     """
 
@@ -40,6 +41,7 @@ class Curve:
     layer: str
     where: str
     label: int | None = None
+    block: str | None = None
     chained: bool = False
 
 
@@ -95,6 +97,8 @@ def entities_of(drawing: Any, layers: Collection[str]) -> Entities:
     off = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_frozen() or layer.is_off()}
     off -= set(layers)
     hatches, pieces = list[Curve](), list[_Piece]()
+    blocks = dict[int | None, str]()
+    leaders = list[tuple[Array, Array]]()
     for entity, on, label in _resolved(drawing.modelspace(), count(), 0):
         kind = entity.dxftype()
         hidden = on.lower() in off or (not layers and bool(entity.dxf.get("invisible", 0)))
@@ -105,6 +109,15 @@ def entities_of(drawing: Any, layers: Collection[str]) -> Entities:
                 entities.hidden_texts[on] += 1
             else:
                 entities.texts.append(_label(entity) if kind == "INSERT" else _text(entity))
+            if kind == "INSERT":
+                blocks[label] = entity.dxf.name
+            continue
+        if kind == "MULTILEADER" and not hidden and (text := _text_of_leader(entity)) is not None:
+            entities.texts.append(text)
+            continue
+        if kind == "LEADER" and not hidden and len(entity.vertices) > 1:
+            tip, *_, end = (np.array(tuple(vertex)) for vertex in entity.vertices)
+            leaders.append((tip, end))
             continue
         if kind in _SILENT:
             continue
@@ -121,7 +134,8 @@ def entities_of(drawing: Any, layers: Collection[str]) -> Entities:
             entities.hidden[on] += len(rings)
         else:
             found = hatches if kind == "HATCH" else entities.curves
-            found.extend(Curve(ring, on, where, label) for ring in rings)
+            found.extend(Curve(ring, on, where, label, blocks.get(label)) for ring in rings)
+    entities.texts = _led(entities.texts, leaders)
     chained, rest = _chained(pieces)
     entities.curves += chained
     entities.left.update(_open(piece.kind) for piece in rest)
@@ -163,6 +177,33 @@ def _text(entity: Any) -> DrawnText:
     mirrored = bool(entity.dxf.text_generation_flag & _BACKWARD) != (entity.dxf.extrusion.z < 0.0)
     line = " ".join(entity.dxf.text.split())
     return DrawnText((_place(entity),), (line,) if line else (), mirrored=mirrored)
+
+
+def _text_of_leader(entity: Any) -> DrawnText | None:
+    """Return the text of a multileader, which stands where its arrows point; None if it has none."""
+    content = entity.context.mtext
+    if content is None:
+        return None
+    from ezdxf.tools.text import plain_mtext
+
+    lines = (" ".join(str(line).split()) for line in plain_mtext(content.default_content, split=True))
+    tips = [
+        _vector(line.vertices[0])
+        for leader in entity.context.leaders
+        for line in leader.lines
+        if line.vertices
+    ]
+    return DrawnText((*tips, _vector(content.insert)), tuple(filter(None, lines)))
+
+
+def _led(texts: Sequence[DrawnText], leaders: Sequence[tuple[Array, Array]]) -> list[DrawnText]:
+    """Return texts and labels, of which those at the end of a leader stand where its arrow points."""
+    moved = list(texts)
+    for tip, end in leaders if texts else ():
+        away = [min(float(np.linalg.norm(place - end)) for place in text.places) for text in texts]
+        k = int(np.argmin(away))
+        moved[k] = replace(moved[k], places=(tip, *moved[k].places))
+    return moved
 
 
 def _label(insert: Any) -> DrawnText:

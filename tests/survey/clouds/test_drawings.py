@@ -6,6 +6,8 @@ import shlex
 import ezdxf
 import numpy as np
 import pytest
+from ezdxf.math import Vec2
+from ezdxf.render import ConnectionSide
 
 from ground.errors import SurveyError, UsageError
 from survey.clouds.masks import open_masks
@@ -375,3 +377,47 @@ def test_a_word_for_a_kind_in_a_label_is_the_kind(drawing, label):
     kinds = ["stretcher", "header", "header"]
     assert [(one.code, one.said.kind) for one in found] == list(zip(("1-0", "1-1", "S3"), kinds, strict=True))
     assert not any(one.doubts for one in found)
+
+
+@pytest.mark.parametrize("label", ["leader", "text", "multileader"])
+def test_a_label_beside_its_stone_is_of_the_stone_that_its_leader_points_to(drawing, label):
+    block = drawing.blocks.new("NUMBER")
+    block.add_circle((0, 0), 0.05)
+    block.add_attdef("NR", (0, 0), dxfattribs={"height": 0.02})
+    space = drawing.modelspace()
+    for k in range(5):
+        square(space, 0.6 * k)
+        place = (0.6 * k + 0.2, 0.1)
+        if k > 2:  # beside it
+            tip, place = place, (0.6 * k + 0.1, 2.0)
+        if label == "multileader" and k > 2:
+            made = space.add_multileader_mtext("Standard")
+            made.set_content(f"N{k}\\PBinder")
+            made.add_leader_line(ConnectionSide.left, [Vec2(tip)])
+            made.build(insert=Vec2(place))
+            continue
+        if k > 2:
+            space.add_leader([tip, (place[0] + 0.01, 1.98)])
+        if label == "text":
+            space.add_text(f"N{k}", height=0.02).set_placement(place)
+        else:
+            space.add_blockref("NUMBER", place).add_auto_attribs({"NR": f"N{k}"})
+    found = drawing.read()
+    assert [one.code for one in found.outlines] == [f"N{k}" for k in range(5)]
+    assert areas(found) == pytest.approx([0.15] * 5)
+    assert [one.said.kind for one in found.outlines][3:] == (
+        ["header"] * 2 if label == "multileader" else [None] * 2
+    )
+
+
+def test_labels_that_stand_in_no_outline_are_listed(drawing):
+    block = drawing.blocks.new("NUMBER")
+    block.add_circle((0, 0), 0.05)
+    block.add_attdef("NR", (0, 0), dxfattribs={"height": 0.02})
+    space = drawing.modelspace()
+    for k in range(5):
+        square(space, 0.6 * k)
+        space.add_blockref("NUMBER", (0.6 * k + 0.2, 0.1 if k < 4 else 2.0)).add_auto_attribs({"NR": f"N{k}"})
+    found = drawing.read()
+    assert [one.code for one in found.outlines] == ["N0", "N1", "N2", "N3", "S5"]
+    assert ("texts", "1 labels stand in no outline: N4") in found.left

@@ -404,3 +404,20 @@ def test_numbered_corners_of_a_national_grid_are_asked_about_their_axes(tmp_path
     clear = [f"{axis}{k}" for k in (1, 2, 3) for axis in ("Nord", "Ost", "Höhe")]
     (stone,) = open_csv(table(tmp_path / "b.csv", ["Stein", *clear], cells)).blocks
     assert stone.vertices[1].tolist() == [431000, 5411001, 0]
+
+
+@pytest.mark.parametrize(
+    ("height", "scale"),
+    [
+        ("Höhe [m ü. M.]", 1.0),
+        ("H.ü.M.", 1.0),
+        ("Quota (m s.l.m.)", 1.0),
+        ("Altitude NGF", 1.0),
+        ("Elev (mm a.s.l.)", 1000.0),
+    ],
+)
+def test_heights_say_what_they_are_counted_from(tmp_path, height, scale):
+    cells = [[code, role, str(x), str(y), str(scale * z)] for code, role, x, y, z in POINTS]
+    path = table(tmp_path / "a.csv", ["Stein", "Rolle", "Ost", "Nord", height], cells)
+    (stone, *_) = open_csv(path).blocks
+    assert stone.vertices[2].tolist() == pytest.approx([1.1, 0.002, 0.65])

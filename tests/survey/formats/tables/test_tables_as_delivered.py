@@ -182,9 +182,9 @@ def test_a_wrong_map_is_refused(columns, words):
     [
         (HEAD, "z=Höhe", "no column 'Höhe' for z; the columns are: block, kind"),
         (
-            (*HEAD[:-1], "Kote"),
+            (*HEAD[:-1], "Pegel"),
             None,
-            "no column 'z' among block, kind, course, role, x, y, Kote; name it with --columns",
+            "no column 'z' among block, kind, course, role, x, y, Pegel; name it with --columns",
         ),
         ((*HEAD[:4], "x", "Easting", "z"), None, "columns 'x' and 'Easting' are both x"),
         ((*HEAD[:6], "z [km]"), None, "column 'z [km]' is in 'km', which is not a unit of length"),
