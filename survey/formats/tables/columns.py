@@ -23,6 +23,7 @@ from ground.tables.columns import (
     unit_of,
 )
 from ground.tables.numbers import shown
+from survey.formats.tables.point_table import FEWEST_CORNERS
 
 __all__ = [
     "ALIASES",
@@ -119,7 +120,6 @@ _MISSPELT = (
     *("course", "depth", "depth sigma", "depth source", "sigma", "station", "Tiefe", "Schicht", "profondeur"),
     *("profondità", "profundidad", "assise", "filare", "hilada"),
 )
-_FEWEST_CORNERS = 3  # of a face
 _ALIKE = 0.8  # similarity from which an unknown name is taken for a misspelt one
 
 
@@ -273,7 +273,7 @@ def _corners(names: Sequence[str]) -> tuple[tuple[int, int, int], ...]:
         if match := re.fullmatch(r"(.*\D)[ _]?([0-9]{1,2})", unit_of(name)[0]):
             places.setdefault(int(match[2]), {})[kind_of_column(match[1])] = k
     whole = [places[number] for number in sorted(places) if {"x", "y", "z"} <= places[number].keys()]
-    return tuple((one["x"], one["y"], one["z"]) for one in whole) if len(whole) >= _FEWEST_CORNERS else ()
+    return tuple((one["x"], one["y"], one["z"]) for one in whole) if len(whole) >= FEWEST_CORNERS else ()
 
 
 def _mine(names: Sequence[str], column_map: ColumnMap, where: str) -> tuple[dict[str, int], tuple[int, ...]]:

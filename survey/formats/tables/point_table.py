@@ -12,9 +12,10 @@ from ground.tables.numbers import shown
 from survey.arrays import Array
 from survey.records.survey import BlockRecord, Reject, SurveyHead
 
-__all__ = ["PointTable", "TableStone", "check_station"]
+__all__ = ["FEWEST_CORNERS", "PointTable", "TableStone", "check_station"]
 
-_FEWEST_CORNERS = 3  # of a face
+FEWEST_CORNERS = 3
+"""Corners of a face."""
 _HOPELESS = 1000  # wrong lines without any stone after which the file is refused
 
 
@@ -144,7 +145,7 @@ class PointTable:
 
     def _record(self, stone: TableStone) -> BlockRecord | Reject:
         count = len(stone.vertices) // 3
-        if stone.error is None and count < _FEWEST_CORNERS:
+        if stone.error is None and count < FEWEST_CORNERS:
             stone.error = SurveyError(
                 f"block {stone.code} has {count} vertices",
                 where=f"{self._path}:{stone.line}",
