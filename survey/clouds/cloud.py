@@ -46,6 +46,7 @@ _MIN_PATCH_SIGMA = 0.0001  # standard deviation of a patch: no scanner is better
 _LARGEST_CORRELATION = 0.6  # of neighbouring patches: beyond, they are one
 _PRIOR = 50.0  # pairs of patches without correlation, as if they had been seen before
 _MAX_ITERATIONS = 5  # until the correlation and what a fit takes of it agree
+_SHIFTED = 1000.0  # distance of a cloud from its outlines that no slip of a frame makes [m]
 _AWAY = 10.0  # distance of the viewer of an orthophoto from the wall [m]
 _ROOM = 0.25  # part of the width of a stone that margins may take
 
@@ -200,6 +201,8 @@ def _apart(
                 f"e.g. x[{unit}] y[{unit}] z[{unit}]"
             )
             break
+    if np.abs((near - middle)[:2]).max() > _SHIFTED:
+        remedy += "; if the cloud was shifted, as by CloudCompare's global shift, export it with its true coordinates"
     return SurveyError(what, where=str(options.outlines), remedy=remedy)
 
 

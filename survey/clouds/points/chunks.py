@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.records.survey import Station
 
@@ -16,6 +17,7 @@ CHUNK = 1_000_000
 """Points of a chunk: 24 MB of coordinates, and large enough that a chunk's fixed costs do not count."""
 
 _HARMLESS = 0.0005  # rounding of single precision that no survey notices [m]
+_HOPELESS = 0.02  # beyond which points of a face lie on lines [m]
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,19 @@ class PointCloud:
 
 
 def lost_digits(path: Path, farthest: float) -> tuple[str, ...]:
-    """Return a warning if coordinates of this size [m] lose digits in single precision, otherwise nothing."""
+    """Return a warning if coordinates of this size [m] lose digits in single precision, otherwise nothing.
+
+    Raises
+    ------
+    SurveyError
+        if they lose so many that no face can be measured
+    """
     lost = float(np.spacing(np.float32(farthest))) / 2.0
-    if not lost > _HARMLESS:
-        return ()
-    return (
-        f"{path}: coordinates are stored in single precision and reach {farthest:.0f} m, where it rounds by up to "
-        f"{lost * 1e3:.2g} mm; export in double precision, or shifted near 0",
+    what = (
+        f"coordinates are stored in single precision and reach {farthest:.0f} m, where it rounds by up to "
+        f"{float(f'{lost * 1e3:.2g}'):g} mm"
     )
+    remedy = "export in double precision, or shifted near 0"
+    if lost > _HOPELESS:
+        raise SurveyError(what, where=str(path), remedy=f"{remedy}; LAS and LAZ lose none")
+    return (f"{path}: {what}; {remedy}",) if lost > _HARMLESS else ()

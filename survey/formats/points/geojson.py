@@ -18,7 +18,7 @@ from ground.tables.columns import COORDINATES
 from ground.tables.numbers import unreadable
 from ground.tables.rows import ListRows, cell_text
 from survey.formats.options import ReadingOptions
-from survey.formats.tables.columns import kind_of_column
+from survey.formats.tables.columns import kind_of_column, read_map
 from survey.formats.tables.reader import open_table
 from survey.formats.tables.wkt import ring_of
 from survey.records.survey import Reject, SurveyStream
@@ -46,6 +46,8 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     names = [name for name in named if kind_of_column(name) not in left_out]
     kinds = {kind_of_column(name) for name in names}
     ids = not kinds & {"block", "description", "name"}
+    if ids and not any("id" in feature for feature in features):
+        _check_named(path, features, names, options)
     rows: list[tuple[int, list[str]]] = [(0, [*names, *(["block"] if ids else []), "outline"])]
     corners: list[Any] = []
     wrong: list[Reject] = []
@@ -71,6 +73,24 @@ def open_geojson(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     remarks = (f"{len(features)} features; places in messages are their numbers",)
     stream = open_table(path, ListRows(str(path), rows, remarks), options or ReadingOptions())
     return replace(stream, blocks=chain(wrong, stream.blocks))
+
+
+def _check_named(
+    path: Path, features: Sequence[Mapping[str, Any]], names: Sequence[str], options: ReadingOptions | None
+) -> None:
+    """Refuse features without an attribute that names the stones, unless the user says which does."""
+    if options is not None and {"block", "description"} & read_map(options.columns).names.keys():
+        return
+    different = [
+        name
+        for name in names
+        if len({cell_text(_properties(one).get(name, "")) for one in features}) == len(features)
+    ]
+    raise SurveyError(
+        f"no attribute {', '.join(names)[:200]} is known to name the stones",
+        where=str(path),
+        remedy=f'say which does, e.g. --columns "block={different[0] if different else "…"}"',
+    )
 
 
 def _features(path: Path) -> list[Mapping[str, Any]]:

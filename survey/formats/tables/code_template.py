@@ -16,6 +16,7 @@ from itertools import product
 
 from ground.errors import UsageError
 from survey.formats.fields import code_of
+from survey.formats.tables.point_table import FEWEST_CORNERS
 from survey.formats.tables.roles import CONTROL, ROLES, is_bare, role_of, roles_with
 
 __all__ = ["CodeFields", "CodeTemplate"]
@@ -61,7 +62,6 @@ _USUAL = (
     ),
     *("{block} {kind} {role} {*}", "{block}{role}", "{block}{role} {*}", "{block}", "{block} {*}"),
 )
-_CORNERS = 3  # of the smallest stone
 _STONES_OF_KIND = 2  # stones for each kind, on average, from which letters that end names are kinds
 
 
@@ -284,7 +284,7 @@ def _is_sensible(text: str, rows: Sequence[CodeFields | None]) -> bool:
     # the letter tells points from corners, and is none of the name
     if counted or "{role?}" in text or "{block}{role}" in text:
         return any(row.role == "point" and corners[row.block] for row in fields)
-    return "{role}" in text or max(corners.values(), default=0) >= _CORNERS
+    return "{role}" in text or max(corners.values(), default=0) >= FEWEST_CORNERS
 
 
 def _end_in_kinds(fields: Sequence[CodeFields]) -> bool:

@@ -12,7 +12,7 @@ from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import ListRows, TextRows
 from survey.formats.tables.code_template import CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, kind_of_column
-from survey.formats.tables.point_table import TableStone
+from survey.formats.tables.point_table import FEWEST_CORNERS, TableStone
 from survey.formats.tables.roles import CONTROL, ROLES, STATION, role_of, roles_with
 
 __all__ = ["are_headed", "check_names", "check_stones_repeat", "note_key", "with_role", "with_units"]
@@ -25,7 +25,6 @@ _ROLE_WORDS = frozenset(
 _OF_STONES = {"vertex", "point", STATION, CONTROL}
 _FEW_WORDS = 3  # unknown ones in a column of roles
 _FEWEST = 4  # rows from which a table of a stone for each row is one of points without stones
-_REPEATS = 3  # rows of a stone, at least
 _NO_CODE = "{block}:{role}:{kind}"  # a template beside which all usual ones are tried
 _ADVISED = re.compile(r'--codes "[^"]*"')
 
@@ -117,7 +116,7 @@ def are_headed(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns
             values = [*rows.cells(row, number), *[""] * columns.count]
             if all(values[columns.at[axis]] for axis in "xyz"):
                 named.append(bool(values[columns.at["block"]]))
-    return bool(named) and named[0] and _REPEATS * sum(named) <= len(named)
+    return bool(named) and named[0] and FEWEST_CORNERS * sum(named) <= len(named)
 
 
 def _unit(text: str) -> str | None:
@@ -160,7 +159,7 @@ def check_stones_repeat(
         if advice is not None and "{role" in advice[0]:
             remedy = f'if {shown(name)} holds codes, give --columns "{before}description={name}" {advice[0]}'
             break
-        if len(texts) >= _REPEATS * len(set(texts)) > _REPEATS:
+        if len(texts) >= FEWEST_CORNERS * len(set(texts)) > FEWEST_CORNERS:
             remedy = f'name the column of the stones: --columns "{before}block={name}"'
             break
     at = columns.at["block"]

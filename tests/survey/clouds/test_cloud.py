@@ -151,6 +151,19 @@ def test_a_cloud_beside_its_outlines_is_told(tmp_path, wall):
         measured(tmp_path, scans.scan(0.05) + np.array([0.0, 0.0, 5.0]), path, wall=wall)
 
 
+@pytest.mark.parametrize("framed", [False, True])
+def test_a_cloud_that_was_shifted_near_zero_is_told(tmp_path, wall, framed):
+    shift = np.array([2683000.0, 1248000.0, 0.0])
+    if framed:
+        path = scans.geojson(tmp_path / "a.geojson")
+        given = {"wall": Wall(wall.origin + shift, wall.axes)}
+    else:
+        path = scans.geojson(tmp_path / "a.geojson", [scans.in_space(ring) + shift for ring in scans.rings()])
+        given = {}
+    with pytest.raises(SurveyError, match="global shift, export it with its true coordinates"):
+        measured(tmp_path, scans.scan(0.05), path, **given)
+
+
 @pytest.mark.parametrize(("unit", "length"), [("cm", 0.01), ("mm", 0.001)])
 def test_the_unit_of_outlines_beside_a_cloud_is_asked_for(tmp_path, wall, unit, length):
     path = scans.geojson(tmp_path / "a.geojson", [ring / length for ring in scans.rings()])

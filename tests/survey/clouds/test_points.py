@@ -163,6 +163,26 @@ def test_single_precision_far_away_warns(tmp_path):
     assert "16 mm" in warning
 
 
+@pytest.mark.parametrize("ending", [".ply", ".pcd", ".e57"])
+def test_single_precision_in_which_faces_are_lines_is_refused(tmp_path, ending):
+    """At 5,411 km single precision steps by half a metre."""
+    path = tmp_path / f"a{ending}"
+    northing = 5411000.0
+    if ending == ".e57":
+        e57_file(path, POINTS + np.array([0.0, northing, 0.0]), [1.0, 0, 0, 0], np.zeros(3))
+    elif ending == ".pcd":
+        rows = "".join(f"{x} {y + northing} {z}\n" for x, y, z in POINTS)
+        fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1"
+        count = f"WIDTH {len(POINTS)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(POINTS)}\nDATA ascii"
+        path.write_text(f"# .PCD v0.7\nVERSION 0.7\n{fields}\n{count}\n{rows}")
+    else:
+        head = "ply\nformat binary_little_endian 1.0\nelement vertex 2\n"
+        head += "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
+        path.write_bytes(head.encode() + np.array([[1.0, northing, 10.0]] * 2, "<f4").tobytes())
+    with pytest.raises(SurveyError, match="rounds by up to 250 mm; export in double precision"):
+        open_points(path)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [

@@ -268,3 +268,25 @@ def test_attributes_of_a_feature_code_are_read_as_the_message_says(tmp_path, nam
     path.write_text(of_features(jxl).replace("MAUER", "1-1:v"), encoding="utf-8")
     (stone,) = open_survey(path, format_of(path)).blocks  # a code that fits has no need of attributes
     assert len(stone.vertices) == 12
+
+
+@pytest.mark.parametrize("name", ["Bezeichnung", "Etichetta", "ref"])
+def test_an_attribute_that_names_the_stones_is_told_as_the_message_says(tmp_path, name):
+    ring = [[x, y, z] for _, x, y, z in CORNERS[:3]]
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"Zustand": "gut", name: f"S{k}"},
+            "geometry": {"type": "Polygon", "coordinates": [[*ring, ring[0]]]},
+        }
+        for k in (1, 2)
+    ]
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    with pytest.raises(SurveyError, match="known to name the stones") as refused:
+        open_survey(path, "geojson")
+    (columns,) = re.findall(r'--columns "([^"]*)"', str(refused.value))
+    assert [one.code for one in open_survey(path, "geojson", ReadingOptions(columns=columns)).blocks] == [
+        "S1",
+        "S2",
+    ]
