@@ -10,7 +10,8 @@ header               laid across the wall: its face is longer than the stretcher
                      than the stone is deep
 stretcher            laid along the wall: its face is shorter than high, or than the stone is deep
 voussoir, keystone   a wedge: its sides do not converge towards the intrados
-springer             its sloped side takes the thrust: all its sides are level or plumb
+springer             its sloped side takes the thrust, or its face, of a vault that springs from the wall:
+                     all its sides are level or plumb, and its face is plumb
 sill, lintel         spans the opening: its face is higher than long
 ===================  ============================================================================
 
@@ -152,6 +153,9 @@ def _no_wedge(index: int, _: StoneQuality, around: _Around) -> _Finding | None:
 
 def _no_slope(_: int, stone: StoneQuality, __: _Around) -> _Finding | None:
     slope, sigma = sloped_side(stone)
+    overhang = math.asin(min(abs(float(stone.normal[2])), 1.0))  # of a vault across the wall
+    if overhang > slope:
+        slope, sigma = overhang, math.radians(stone.tilt_sigma)
     text = f"its steepest side is {math.degrees(slope):.1f}° off level or plumb; it takes no thrust"
     return _Finding(_SLOPED - slope, sigma, text)
 

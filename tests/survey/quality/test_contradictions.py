@@ -121,6 +121,16 @@ def test_a_springer_has_a_sloped_side() -> None:
     assert (one.code, one.excess) == ("B", pytest.approx(math.radians(5.0)))
 
 
+@pytest.mark.parametrize(("degrees", "contradicts"), [(22.0, False), (8.0, False), (4.0, True), (0.0, True)])
+def test_the_face_of_a_springer_slopes_where_a_vault_springs_from_the_wall(
+    degrees: float, contradicts: bool
+) -> None:
+    out, down = math.cos(math.radians(degrees)), -math.sin(math.radians(degrees))
+    square = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.4), (0.0, 0.4)]
+    stone = polygon_stone("A", "springer", square, normal=np.array([0.0, -out, down]))
+    assert bool(contradictions([stone], [])) == contradicts
+
+
 def test_the_sloped_side_of_a_springer_may_be_short_beside_its_bed() -> None:
     long_bed = polygon_stone("A", "springer", [(0, 0), (1.2, 0), (1.0, 0.3), (0, 0.3)])
     corbelled = polygon_stone("B", "springer", [(2, 0), (2.8, 0), (3.0, 0.3), (2, 0.3)])
