@@ -179,7 +179,8 @@ def check_block(one: BlockRecord, data: bytes, format: str) -> None:
     assert one.sigma > 0.0
     if format == "geojson" or data.startswith((b"PK", b"\xff\xfe", b"\xfe\xff")) or b"POLYGON" in data:
         return  # of which a line is not a point
-    if b"\r" in data and b"\n" not in data:
+    if b"\r" in data and (b"\n" not in data or data.startswith(b"<?xml")):  # each ends a line of XML
+        data = data.replace(b"\r\n", b"\n")
         data = data.replace(b"\r", b"\n")
     lines = ["", *data.decode("utf-8-sig" if is_utf8(data) else "cp1252", "replace").split("\n")]
     own = [lines[k] for span in one.spans for k in span]
