@@ -201,8 +201,9 @@ def _apart(
                 f"e.g. x[{unit}] y[{unit}] z[{unit}]"
             )
             break
-    if np.abs((near - middle)[:2]).max() > _SHIFTED:
-        remedy += "; if the cloud was shifted, as by CloudCompare's global shift, export it with its true coordinates"
+    else:
+        if np.abs((near - middle)[:2]).max() > _SHIFTED:
+            remedy += "; if the cloud was shifted, as by CloudCompare's global shift, export it with true coordinates"
     return SurveyError(what, where=str(options.outlines), remedy=remedy)
 
 

@@ -160,7 +160,7 @@ def test_a_cloud_that_was_shifted_near_zero_is_told(tmp_path, wall, framed):
     else:
         path = scans.geojson(tmp_path / "a.geojson", [scans.in_space(ring) + shift for ring in scans.rings()])
         given = {}
-    with pytest.raises(SurveyError, match="global shift, export it with its true coordinates"):
+    with pytest.raises(SurveyError, match="global shift, export it with true coordinates"):
         measured(tmp_path, scans.scan(0.05), path, **given)
 
 
