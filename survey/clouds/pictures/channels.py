@@ -36,7 +36,7 @@ def channels_of(
     if left_out is not None:
         void = void | left_out
     channels = [light, green, blue, *([] if depth is None else [_relief(depth)])]
-    return [_without(channel, hidden | void) for channel in channels], hidden, void
+    return _without(channels, hidden | void), hidden, void
 
 
 def lightness(pixels: NDArray[np.uint8]) -> tuple[Field, Field, Field]:
@@ -71,7 +71,8 @@ def grains(channels: list[Field]) -> NDArray[np.float32]:
 
     out = np.stack([uniform_filter(channel, round(WIDTH)) for channel in channels])
     apart = 2 * round(WIDTH)
-    usual = CONSISTENT * np.median(np.abs(out[:, :, apart:] - out[:, :, :-apart]), axis=(1, 2))
+    sparse = out[:, :: round(WIDTH)]
+    usual = CONSISTENT * np.median(np.abs(sparse[:, :, apart:] - sparse[:, :, :-apart]), axis=(1, 2))
     least = ROUNDED / round(WIDTH)  # of the mean of its pixels
     over: Field = (out / np.maximum(usual, least)[:, None, None]).astype(np.float32)
     return over
@@ -84,15 +85,14 @@ def _relief(depth: Field) -> Field:
     return np.clip(np.where(known, 1e3 * (depth - middle), 0.0), -40.0, 40.0).astype(np.float32)
 
 
-def _without(channel: Field, where: Bools) -> Field:
-    """Return a channel whose hidden pixels have the mean of those around them, so that they show no joints."""
+def _without(channels: list[Field], where: Bools) -> list[Field]:
+    """Return channels whose hidden pixels have the value of the nearest that is seen, so that they show no joints."""
     from scipy.ndimage import distance_transform_edt
 
     if not where.any() or where.all():
-        return channel
-    nearest = distance_transform_edt(where, return_distances=False, return_indices=True)
-    out: Field = channel[tuple(nearest)]
-    return out
+        return channels
+    nearest = tuple(distance_transform_edt(where, return_distances=False, return_indices=True))
+    return [channel[nearest] for channel in channels]
 
 
 def openings(light: Field, depth: Field | None) -> Bools:

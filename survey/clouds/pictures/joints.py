@@ -11,10 +11,14 @@ and bridges gaps. All of it
 happens at a resolution at which a joint is `WIDTH` pixels wide, so that no length depends on the picture.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from survey.arrays import Ints
+from survey.clouds.pictures._kernels.lines import contrasts, keep_strongest, line_means, side_steps
 
 __all__ = [
     "ROUNDED",
@@ -36,7 +40,9 @@ ROUNDED = 0.3
 Field = NDArray[np.float32]
 
 _DIRECTIONS = 16  # over half a turn: 11° apart, so that a line of 8 pixels leaves its pixels by less than one
-_SHORT, _LONG = 3, 5  # doublings of the lines: 8 and 32 pixels
+_SQUARE = np.radians(25.0)  # angle from the horizontal of beds, and of head joints from the vertical, at most
+_SHORT = np.arange(-4, 5)  # places along a short line [px]
+_LONG = 4 * _SHORT  # and along one of 33 pixels: a mean along a short line is about that of the next few
 _NO_STEP, _STEP = 2.0, 5.0  # steps of colour that texture makes, and that two stones make [grains]
 _SUREST_STEP = (
     0.5  # evidence of a step at most, over that of a usual joint: both edges of mortar are steps too
@@ -75,7 +81,8 @@ def combined(channels: list[Field]) -> Field:
     for channel in channels:
         grain, contrast = grain_and_contrast(channel)
         total += np.float32(contrast / grain**2) * channel
-    scale = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
+    sparse = total[:: round(WIDTH)]
+    scale = 1.4826 * float(np.median(np.abs(sparse - np.median(sparse)))) + 1e-9
     return (total / scale).astype(np.float32)
 
 
@@ -89,7 +96,7 @@ def grain_and_contrast(channel: Field) -> tuple[float, float]:
     distance of a joint, without the largest tenth, which edges make: a median would be zero where a file
     rounds colours.
     """
-    from scipy.ndimage import gaussian_filter
+    from scipy.ndimage import gaussian_filter, uniform_filter1d
 
     smooth = gaussian_filter(channel, 0.7)
     steps = np.concatenate(
@@ -98,11 +105,14 @@ def grain_and_contrast(channel: Field) -> tuple[float, float]:
     steps = steps[:: max(1, len(steps) // 100_000)]
     grain = float(steps[steps <= np.quantile(steps, 0.9)].mean())
     contrast = 0.0
-    for turned in (smooth, smooth.T):
-        # along a line of 32 pixels, the mean of the next few is about the same
-        line = np.ascontiguousarray(_means(np.ascontiguousarray(turned), 0.0, _LONG)[:, ::_SPARSE])
+    for axis, turn in ((1, 0.0), (0, 0.5 * np.pi)):
+        line = uniform_filter1d(smooth, int(np.ptp(_LONG)) + 1, axis=axis)
+        # along such a line, the mean of the next few is about the same
+        sparse = np.ascontiguousarray(line[:, ::_SPARSE] if axis else line[::_SPARSE])
+        exceeds = np.empty_like(sparse)
         for sign in (1.0, -1.0):
-            contrast += sign * float(np.quantile(_exceeds(sign * line, 0.0, _REACHES[0]), 0.98))
+            contrasts(np.float32(sign) * sparse, *_sides(turn, _REACHES[:1]), exceeds)
+            contrast += sign * float(np.quantile(exceeds, 0.98))
     return 1.25 * grain + ROUNDED, contrast
 
 
@@ -113,26 +123,17 @@ def line_strength(image: Field) -> Strength:
     ----------
     image : (h, w) at a resolution at which joints are `WIDTH` pixels wide
     """
-    best = np.zeros_like(image)
-    angle, level, upright = (np.zeros_like(image) for _ in range(3))
-    for step in range(_DIRECTIONS):
-        turn = np.pi * step / _DIRECTIONS
-        steep, slope = _slope(turn)
-        turned = np.ascontiguousarray(image.T) if steep else image
-        line = _means(turned, -slope, _SHORT)
-        contrast = np.maximum.reduce([_exceeds(line, -slope, reach) for reach in _REACHES])
-        long = _means(contrast, -slope, _LONG)
-        evidence = np.sqrt(np.maximum(contrast, 0.0) * np.maximum(long, 0.0))
-        if steep:
-            contrast, evidence = contrast.T, evidence.T
-        better = evidence > best
-        best = np.where(better, evidence, best)
-        angle[better] = turn
-        if min(turn, np.pi - turn) < np.radians(25.0):
-            np.maximum(level, contrast, out=level)
-        elif abs(turn - 0.5 * np.pi) < np.radians(25.0):
-            np.maximum(upright, contrast, out=upright)
-    return Strength(best, upright, level, angle)
+    best, angle, level, upright = (np.zeros_like(image) for _ in range(4))
+    line, contrast, long = (np.empty_like(image) for _ in range(3))
+    for turn in _turns(1):
+        line_means(image, *_along(turn, _SHORT), line)
+        contrasts(line, *_sides(turn, _REACHES), contrast)
+        line_means(contrast, *_along(turn, _LONG), long)
+        keep_strongest(contrast, long, np.float32(turn), best, angle)
+        for square, axis in ((level, 0.0), (upright, 0.5 * np.pi), (level, np.pi)):
+            if abs(turn - axis) < _SQUARE:
+                np.maximum(square, contrast, out=square)
+    return Strength(np.sqrt(best, out=best), upright, level, angle)
 
 
 def step_evidence(colours: NDArray[np.float32]) -> Field:
@@ -146,65 +147,36 @@ def step_evidence(colours: NDArray[np.float32]) -> Field:
     -------
     (h, w) in proportion to the geometric mean of the steps across a short and a long line, beyond those of texture
     """
-    best = np.zeros_like(colours[0])
-    for step in range(0, _DIRECTIONS, 2):  # a step is wider than a line, and so less of a direction
-        steep, slope = _slope(np.pi * step / _DIRECTIONS)
-        short, long = (np.zeros_like(best.T if steep else best) for _ in range(2))
+    line, step, long, total, total_long = (np.empty_like(colours[0]) for _ in range(5))
+    best = np.zeros_like(line)
+    for turn in _turns(2):  # a step is wider than a line, and so less of a direction
+        down, right = _sides(turn, _REACHES[:1])
+        total[:], total_long[:] = 0.0, 0.0
         for colour in colours:
-            line = _means(np.ascontiguousarray(colour.T) if steep else colour, -slope, _SHORT)
-            after, before = _sides(line, -slope, _REACHES[0])
-            short += (after - before) ** 2
-            long += _means(after - before, -slope, _LONG) ** 2
-        mean = (short * long) ** np.float32(0.25)
-        np.maximum(best, mean.T if steep else mean, out=best)
-    share = np.clip((best - _NO_STEP) / (_STEP - _NO_STEP), 0.0, 1.0)
-    steps: Field = (_SUREST_STEP * share).astype(np.float32)
-    return steps
+            line_means(colour, *_along(turn, _SHORT), line)
+            side_steps(line, down[0], right[0], step)
+            line_means(step, *_along(turn, _LONG), long)
+            total += np.square(step, out=step)
+            total_long += np.square(long, out=long)
+        np.maximum(best, np.multiply(total, total_long, out=total), out=best)
+    share = np.clip((best ** np.float32(0.25) - _NO_STEP) / (_STEP - _NO_STEP), 0.0, 1.0)
+    evidence: Field = (_SUREST_STEP * share).astype(np.float32)
+    return evidence
 
 
-def _slope(turn: float) -> tuple[bool, float]:
-    """Return whether a line is nearer to the vertical, and its slope from the nearer axis.
-
-    Rows grow downwards: a line that rises to the right climbs to smaller rows.
-    """
-    steep = np.pi / 4 < turn < 3 * np.pi / 4
-    return steep, float(1.0 / np.tan(turn) if steep else np.tan(turn))
+def _turns(every: int) -> Iterator[float]:
+    """Yield every so many of the directions of lines [rad]."""
+    yield from (np.pi * np.arange(0, _DIRECTIONS, every) / _DIRECTIONS).tolist()
 
 
-def _means(image: Field, slope: float, doublings: int) -> Field:
-    """Return means along lines of 2^doublings pixels about each pixel, whose rows change by `slope` a column."""
-    out, count = image, 1
-    for _ in range(doublings):
-        out = 0.5 * (out + _shifted(out, round(count * slope), count))
-        count *= 2
-    half = count // 2
-    return _shifted(out, -round(half * slope), -half)
+def _along(turn: float, places: Ints) -> tuple[Ints, Ints]:
+    """Return rows and columns from a pixel to places along a line; rows grow downwards, where a line that rises has fewer."""
+    down, right = -np.sin(turn), np.cos(turn)
+    larger = max(abs(down), abs(right))
+    return np.round(places * down / larger).astype(np.int64), np.round(places * right / larger).astype(np.int64)
 
 
-def _shifted(image: Field, rows: int, columns: int) -> Field:
-    """Return the picture (h, w) whose pixel is that some rows down and columns to the right; edges go on."""
-    height, width = image.shape
-    out = np.empty_like(image)
-    if abs(rows) >= height or abs(columns) >= width:
-        out[:] = image
-        return out
-    top, bottom = max(0, -rows), min(height, height - rows)
-    first, last = max(0, -columns), min(width, width - columns)
-    out[top:bottom, first:last] = image[top + rows : bottom + rows, first + columns : last + columns]
-    out[top:bottom, :first] = out[top:bottom, first : first + 1]
-    out[top:bottom, last:] = out[top:bottom, last - 1 : last]
-    out[:top] = out[top]
-    out[bottom:] = out[bottom - 1]
-    return out
-
-
-def _exceeds(line: Field, slope: float, reach: int) -> Field:
-    """Return by how much each line exceeds both of those beside it at a distance, the lesser; 0 below."""
-    return np.maximum(line - np.maximum(*_sides(line, slope, reach)), 0.0)
-
-
-def _sides(line: Field, slope: float, reach: int) -> tuple[Field, Field]:
-    """Return the lines at a distance on both sides of each."""
-    length = float(np.hypot(1.0, slope))
-    rows, columns = round(reach / length), round(-reach * slope / length)
-    return _shifted(line, rows, columns), _shifted(line, -rows, -columns)
+def _sides(turn: float, reaches: tuple[int, ...]) -> tuple[Ints, Ints]:
+    """Return rows and columns from the middle of a line to one of its sides at some distances."""
+    apart = np.array(reaches)
+    return np.round(apart * np.cos(turn)).astype(np.int64), np.round(apart * np.sin(turn)).astype(np.int64)

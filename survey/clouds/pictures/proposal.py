@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,7 @@ __all__ = [
 _REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
 _HIDDEN = 0.6  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
-_COURSED = 0.86  # part of the strong joints that are level or upright, from which there are courses
-# (rendered rubble has 0.71 to 0.82, a wall with an arch 0.93)
+_COURSED = 0.5  # part of the strong joints that are level or upright, from which there are courses
 _CHROMA = slice(1, 3)  # channels of a* and b*: those of lightness step at every edge of a shade
 _OPEN = 6.0  # size of an opening over the width of a joint
 
@@ -220,18 +220,17 @@ def _counter_clockwise(ring: Array) -> Array:
 def _parts(photograph: Photograph, factor: float, settings: OutlineSettings) -> Iterator[tuple[slice, slice]]:
     """Yield the parts of a picture, rows and columns, that are worked on one after another."""
     height, width = photograph.pixels.shape[:2]
-    step, spare = round(settings.tile * factor), round(settings.overlap * factor)
-    for top in _starts(height, step, spare):
-        for start in _starts(width, step, spare):
-            yield slice(top, min(top + step, height)), slice(start, min(start + step, width))
+    most, spare = round(settings.tile * factor), round(settings.overlap * factor)
+    for rows in _overlapping(height, most, spare):
+        for columns in _overlapping(width, most, spare):
+            yield rows, columns
 
 
-def _starts(length: int, step: int, spare: int) -> list[int]:
-    """Return where parts of a side begin, so that they overlap."""
-    if length <= step:
-        return [0]
-    count = int(np.ceil((length - spare) / (step - spare)))
-    return [round(k * (length - step) / (count - 1)) for k in range(count)]
+def _overlapping(length: int, most: int, spare: int) -> list[slice]:
+    """Return the fewest parts of a side that overlap, all of about the same length."""
+    count = max(1, int(np.ceil((length - spare) / (most - spare))))
+    ends = np.round(np.linspace(0.0, max(length - spare, 0), count + 1)).astype(int).tolist()
+    return [slice(start, min(stop + spare, length)) for start, stop in pairwise(ends)]
 
 
 @dataclass(frozen=True)
@@ -300,7 +299,7 @@ def _kind_of(strength: Strength) -> str:
     if not strong.any():
         return "coursed"
     angle, weight = strength.angle[strong], strength.evidence[strong]
-    square = np.minimum(np.abs(np.sin(angle)), np.abs(np.cos(angle))) < np.sin(np.radians(12.0))
+    square = np.minimum(np.abs(np.sin(angle)), np.abs(np.cos(angle))) < 0.1  # of the directions, 11° apart, two
     return "coursed" if float(weight[square].sum() / weight.sum()) > _COURSED else "rubble"
 
 

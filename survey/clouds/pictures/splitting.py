@@ -8,8 +8,10 @@ same weights as of all borders, is high.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import expit
 
 from survey.arrays import Array, Bools, Ints
@@ -117,7 +119,7 @@ def _lines(
 
 def _best_line(ratio: Field, mask: Bools, hidden: Bools) -> Line | None:
     """Return the strongest line from top to bottom of a region; None where it is too narrow."""
-    from scipy.ndimage import binary_erosion, maximum_filter1d
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     rows, columns = mask.shape
     clear = round(_CLEAR * WIDTH)
@@ -125,23 +127,32 @@ def _best_line(ratio: Field, mask: Bools, hidden: Bools) -> Line | None:
         return None
     wide = maximum_filter1d(ratio, 3, axis=1)
     # the joints at the sides of a region are no joints within it
-    seen = binary_erosion(mask, np.ones((1, 2 * clear + 1), dtype=bool)) & ~hidden
+    seen = minimum_filter1d(mask.view(np.uint8), 2 * clear + 1, axis=1, mode="constant").view(np.bool_) & ~hidden
+    sums = np.zeros((3, rows + 1, columns), dtype=np.float32)
+    np.cumsum(np.stack([seen, wide * seen, (wide < _GAP) & seen]), axis=1, out=sums[:, 1:])
     best: Line | None = None
-    along = np.linspace(-1.0, 1.0, rows)
     for lean in range(-_LEAN, _LEAN + 1, 2):
-        at = np.clip(np.arange(columns)[None] + np.round(lean * along).astype(int)[:, None], 0, columns - 1)
-        values = np.take_along_axis(wide, at, axis=1)
-        inside = np.take_along_axis(seen, at, axis=1)
-        count = inside.sum(axis=0)
-        mean = (values * inside).sum(axis=0) / np.maximum(count, 1)
-        mean[count < _ACROSS * rows] = 0.0
+        count, total, lack = _along(sums, lean)
+        enough = count >= _ACROSS * rows
+        mean = np.where(enough, total / np.maximum(count, 1.0), 0.0)
         middle = int(np.argmax(mean))
         if best is None or mean[middle] > best.strength:
-            lack = ((values < _GAP) & inside)[:, middle].sum() / max(int(count[middle]), 1)
-            usual = float(np.median(mean[count >= _ACROSS * rows])) if mean[middle] > 0.0 else 1.0
+            usual = float(np.median(mean[enough])) if mean[middle] > 0.0 else 1.0
             prominence = float(np.log((mean[middle] + 0.02) / (usual + 0.02)))
-            best = Line(float(mean[middle]), float(lack), prominence, middle, lean)
+            gaps = float(lack[middle] / max(count[middle], 1.0))
+            best = Line(float(mean[middle]), gaps, prominence, middle, lean)
     return best
+
+
+def _along(sums: NDArray[np.float32], lean: int) -> NDArray[np.float32]:
+    """Return sums (k, w) along lines whose ends lean to either side, of cumulative sums (k, h + 1, w) of columns."""
+    shifts = np.round(lean * np.linspace(-1.0, 1.0, sums.shape[1] - 1)).astype(int)
+    ends = [0, *(np.flatnonzero(np.diff(shifts)) + 1).tolist(), len(shifts)]
+    out = np.zeros((len(sums), sums.shape[2] + 2 * _LEAN), dtype=np.float32)
+    for start, stop in pairwise(ends):
+        first = _LEAN - int(shifts[start])
+        out[:, first : first + sums.shape[2]] += sums[:, stop] - sums[:, start]
+    return out[:, _LEAN:-_LEAN]
 
 
 def _beyond(shape: tuple[int, ...], line: Line) -> Bools:

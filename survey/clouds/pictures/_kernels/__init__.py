@@ -1,0 +1,1 @@
+"""Numba kernels of pictures: contrasts along lines, and regions that are flooded."""
