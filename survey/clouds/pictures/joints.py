@@ -112,7 +112,7 @@ def grain_and_contrast(channel: Field) -> tuple[float, float]:
         exceeds = np.empty_like(sparse)
         for sign in (1.0, -1.0):
             contrasts(np.float32(sign) * sparse, *_sides(turn, _REACHES[:1]), exceeds)
-            contrast += sign * float(np.quantile(exceeds, 0.98))
+            contrast += sign * float(np.median(np.quantile(exceeds, 0.98, axis=1 - axis)))
     return 1.25 * grain + ROUNDED, contrast
 
 

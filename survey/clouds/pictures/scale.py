@@ -13,8 +13,8 @@ __all__ = ["joint_width", "resized", "resized_field"]
 _WIDTHS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)  # widths of joints that are tried [px]
 _SAMPLE = 512  # side of the parts of a picture that they are tried on, at most [px]
 _ENOUGH = 128.0  # side over the width of a joint from which a part is no larger: some courses of some stones
-_BEST = 3  # of five parts whose contrasts count: the others may show a door, a scaffold or a bush
-_GOOD = 0.7  # of the best contrast over grain, from which a finer resolution is preferred: it has the better edges
+_AGREE = 2  # of five parts that show joints of a width: others may show a door, one may show a bush or a scaffold
+_GOOD = 0.5  # of the best contrast over grain, from which a finer resolution is preferred: it has the better edges
 
 
 def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[float, float]:
@@ -27,7 +27,7 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
 
     Returns
     -------
-    width [px], and the contrast of joints over grain at it
+    width [px], and the best contrast of joints over grain
     """
     widths = []
     for width in _WIDTHS:
@@ -39,11 +39,11 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
             channels, _, _ = channels_of(resized(pixels[part], width / WIDTH), heights)
             grain, contrast = grain_and_contrast(combined(channels))
             ratios.append(contrast / grain)
-        widths.append((width, float(np.mean(sorted(ratios)[-_BEST:]))))
+        widths.append((width, sorted(ratios)[-min(_AGREE, len(ratios))]))
     if not widths:
         return WIDTH, 0.0
     best = max(ratio for _, ratio in widths)
-    return next((one, ratio) for one, ratio in widths if ratio >= min(_GOOD * best, best))
+    return next(width for width, ratio in widths if ratio >= min(_GOOD * best, best)), best
 
 
 def _parts(shape: tuple[int, ...], side: int) -> Iterator[tuple[slice, slice]]:
