@@ -13,7 +13,7 @@ from survey.clouds.pictures.photograph import Photograph
 from survey.clouds.pictures.proposal import Fields, measured_fields
 from survey.clouds.pictures.regions import closed_regions
 from survey.clouds.pictures.scale import joint_width
-from survey.clouds.pictures.splitting import line_features, lines_across
+from survey.clouds.pictures.splitting import line_features, lines_across, propose_missing
 from survey.clouds.world import PixelPlace
 from synthetic.buildings.rendered_walls import STYLES, rasterised, render_wall
 
@@ -27,21 +27,40 @@ Samples = list[tuple[Array, bool]]
 
 
 def fitted(draws: int) -> Iterator[tuple[str, Array]]:
-    """Yield names and weights: of borders in courses, in rubble, and of missing joints, by all rendered walls."""
+    """Yield names and weights: of borders in courses and in rubble, of missing joints, and of borders that stayed."""
     walls = [one for seed in range(draws) for weathered in (False, True) for one in _walls(seed, weathered)]
+    stayed: Samples = []
+    missing: Array | None = None
     for kind in ("coursed", "rubble"):
         own = [(fields, true) for style, fields, true in walls if (style == "rubble") == (kind == "rubble")]
         weights: Array | None = None
         for _ in range(_ROUNDS):
             borders: Samples = []
-            missing: Samples = []
+            lines: Samples = []
             for fields, true in own:
-                _collect(fields, true, kind, weights, borders, missing)
+                _collect(fields, true, kind, weights, borders, lines)
             weights = _regression(borders)
         assert weights is not None
         yield kind, weights
         if kind == "coursed":
-            yield "missing", _regression(missing)
+            missing = _regression(lines)
+            yield "missing", missing
+        for fields, true in own:
+            stayed += _stayed(fields, true, kind, weights, missing if kind == "coursed" else None)
+    yield "stayed", _regression(stayed)
+
+
+def _stayed(fields: Fields, true: Ints, kind: str, weights: Array, missing: Array | None) -> Samples:
+    """Return the borders that stay in the end: what their features amount to, and whether they are between stones."""
+    regions = closed_regions(fields.parting, fields.void)
+    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    bond.weights = weights
+    join_weak(bond)
+    regions = renumbered(regions, bond)
+    if missing is not None:
+        regions = propose_missing(regions, fields.strength, fields.hidden, weights=missing)
+    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    return [(np.array([1.0, terms @ weights]), different) for terms, different in _samples(bond, regions, true)]
 
 
 def _walls(seed: int, weathered: bool) -> Iterator[tuple[str, Fields, Ints]]:

@@ -315,7 +315,7 @@ def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     for one in shapes:
         borders = []
         for other, border in bond.borders[one.number].items():
-            chance = bond.probability(one.number, other)
+            chance = bond.certainty(one.number, other)
             row, column = (border.sums[2:4] / border.length).tolist()
             borders.append((place.get(other, -1), chance, (column, row), border.length))
         score = min([chance for _, chance, _, length in borders if length > WIDTH] or [1.0])

@@ -6,7 +6,7 @@ joint would follow from bed to bed, may still stand out. Such a line is proposed
 same weights as of all borders, is high.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,10 +18,7 @@ from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import LIKELY, WEIGHTS
 from survey.clouds.pictures.joints import WIDTH, Field, Strength
 
-__all__ = ["MISSING_WEIGHTS", "Line", "line_features", "lines_across", "propose_missing"]
-
-MISSING_WEIGHTS = WEIGHTS["missing"]
-"""Weights of: constant, strength, gaps, prominence, how much fuller the whole is, size."""
+__all__ = ["Line", "line_features", "lines_across", "propose_missing"]
 
 _ACROSS = 0.6  # part of the height of a region that a line crosses at least
 _LEAN = 4  # pixels by which the ends of a line lean to either side
@@ -49,7 +46,13 @@ class Line:
     lean: int
 
 
-def propose_missing(regions: Ints, strength: Strength, hidden: Bools, least: float = LIKELY) -> Ints:
+def propose_missing(
+    regions: Ints,
+    strength: Strength,
+    hidden: Bools,
+    least: float = LIKELY,
+    weights: Sequence[float] | Array = WEIGHTS["missing"],
+) -> Ints:
     """Part regions where a straight joint across them is likely.
 
     Parameters
@@ -58,6 +61,7 @@ def propose_missing(regions: Ints, strength: Strength, hidden: Bools, least: flo
     strength : of joints, 1 at a usual one
     hidden : (h, w) where joints cannot be seen
     least : probability from which a line is proposed
+    weights : of constant, strength, gaps, prominence, how much fuller the whole is, and size
 
     Returns
     -------
@@ -72,7 +76,7 @@ def propose_missing(regions: Ints, strength: Strength, hidden: Bools, least: flo
         number, box, depth = waiting.pop()
         best: tuple[float, Bools] | None = None
         for axis, whole, after, line in _lines(out, number, box, strength, hidden):
-            chance = _probability(whole, after, line)
+            chance = float(expit(line_features(whole, after, line) @ np.array(weights)))
             if chance >= least and (best is None or chance > best[0]):
                 best = chance, after if axis else after.T
         if best is None:
@@ -160,11 +164,6 @@ def _beyond(shape: tuple[int, ...], line: Line) -> Bools:
     rows, columns = shape
     place = line.middle + np.round(line.lean * np.linspace(-1.0, 1.0, rows)).astype(int)
     return np.arange(columns)[None] > place[:, None]
-
-
-def _probability(whole: Bools, after: Bools, line: Line) -> float:
-    """Return the probability of a line."""
-    return float(expit(line_features(whole, after, line) @ np.array(MISSING_WEIGHTS)))
 
 
 def line_features(whole: Bools, after: Bools, line: Line) -> Array:
