@@ -53,13 +53,13 @@ def fitted(draws: int) -> Iterator[tuple[str, Array]]:
 def _stayed(fields: Fields, true: Ints, kind: str, weights: Array, missing: Array | None) -> Samples:
     """Return the borders that stay in the end: what their features amount to, and whether they are between stones."""
     regions = closed_regions(fields.parting, fields.void)
-    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
     bond.weights = weights
     join_weak(bond)
     regions = renumbered(regions, bond)
     if missing is not None:
         regions = propose_missing(regions, fields.strength, fields.hidden, weights=missing)
-    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
     return [(np.array([1.0, terms @ weights]), different) for terms, different in _samples(bond, regions, true)]
 
 
@@ -81,7 +81,7 @@ def _collect(
 ) -> None:
     """Add the borders of a wall before and after regions are joined, and the lines across regions."""
     regions = closed_regions(fields.parting, fields.void)
-    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
     if weights is not None:
         bond.weights = weights
     borders += _samples(bond, regions, true)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from survey.arrays import Array, Ints
+from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.joints import WIDTH, Strength
 from survey.clouds.pictures.regions import borders_of
 
@@ -124,7 +124,9 @@ class Bond:
         return self.areas[a] / _box_area(self.boxes[a])
 
 
-def bond_of(regions: Ints, strength: Strength, colours: NDArray[np.float32], kind: str) -> Bond:
+def bond_of(
+    regions: Ints, strength: Strength, colours: NDArray[np.float32], hidden: Bools, kind: str
+) -> Bond:
     """Gather the regions of a picture and their borders.
 
     Parameters
@@ -132,13 +134,17 @@ def bond_of(regions: Ints, strength: Strength, colours: NDArray[np.float32], kin
     regions : (h, w) numbers; 0 is no region
     strength : of joints, 1 at a usual one
     colours : (c, h, w) each over its grain
+    hidden : (h, w) where joints cannot be seen
     kind : of masonry, a key of `WEIGHTS`
     """
     from scipy.ndimage import find_objects
 
     ratio = np.minimum(strength.evidence, _STRONGEST).astype(np.float32)
     rows, columns = (index.astype(np.float32) for index in np.indices(regions.shape))
-    found = borders_of(regions, np.stack([ratio, (ratio >= _GAP).astype(np.float32), rows, columns]), colours)
+    # what is not seen is as likely a joint as none
+    joint = np.where(hidden, np.float32(0.5), ratio >= _GAP).astype(np.float32)
+    ratio[hidden] = 0.5
+    found = borders_of(regions, np.stack([ratio, joint, rows, columns]), colours, hidden)
     sums = found.sums.copy()
     sums[:, 1] = found.lengths - sums[:, 1]  # a gap where neither side has a joint
     borders: dict[int, dict[int, Border]] = {}

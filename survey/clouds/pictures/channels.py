@@ -16,6 +16,7 @@ _BEFORE = (
     0.035  # distance before the faces of what is no stone [m], more than bosses of plain ashlar stand out
 )
 _GREEN = 11.0  # by which leaves are greener than the wall [units of a*]: 2.3 are just seen
+_DENSE = 0.3  # part of the pixels before the wall from which it is hidden
 _LEAST = 8.0  # width of an opening over that of a joint
 _MIDDLE = (25.0, 75.0)  # per cent of the depths of a wall between which those of its faces lie
 
@@ -32,11 +33,13 @@ def channels_of(
     left_out : (h, w) what is no wall, as a mask says
     """
     light, green, blue = lightness(pixels)
-    hidden, void = covered(green, depth), openings(light, depth)
+    before = _before(green, depth)
+    hidden, void = covered(before), openings(light, depth)
     if left_out is not None:
         void = void | left_out
     channels = [light, green, blue, *([] if depth is None else [_relief(depth)])]
-    return _without(channels, hidden | void), hidden, void
+    # single leaves are no stone either
+    return _without(channels, hidden | void | before), hidden, void
 
 
 def lightness(pixels: NDArray[np.uint8]) -> tuple[Field, Field, Field]:
@@ -127,21 +130,25 @@ def _runs(where: Bools, least: int) -> Bools:
     return out
 
 
-def covered(green: Field, depth: Field | None) -> Bools:
-    """Return the pixels (h, w) in which something stands before the wall: leaves by colour, anything by depth.
+def _before(green: Field, depth: Field | None) -> Bools:
+    """Return the pixels (h, w) that show what is before the wall: leaves by colour, anything by depth.
 
     Parameters
     ----------
     green : (h, w) a*, negative where it is green
     depth : as in `openings`
     """
-    from scipy.ndimage import binary_closing, binary_opening, uniform_filter
-
     leaves = green < float(np.median(green)) - _GREEN
-    covering = binary_opening(leaves, np.ones((3, 3), dtype=bool)) if leaves.any() else leaves
     if depth is not None and np.isfinite(depth).any():
-        before = np.nan_to_num(depth, nan=0.0) > float(np.nanmedian(depth)) + _BEFORE
-        covering |= uniform_filter(before.astype(np.float32), 5) > 0.3
-    if not covering.any():
-        return covering
+        leaves |= np.nan_to_num(depth, nan=0.0) > float(np.nanmedian(depth)) + _BEFORE
+    return leaves
+
+
+def covered(before: Bools) -> Bools:
+    """Return where (h, w) so much is before the wall that joints cannot be seen."""
+    from scipy.ndimage import binary_closing, uniform_filter
+
+    if not before.any():
+        return before
+    covering = uniform_filter(before.astype(np.float32), 5) > _DENSE
     return np.asarray(binary_closing(covering, np.ones((5, 5), dtype=bool)), dtype=np.bool_)

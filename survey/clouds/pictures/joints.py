@@ -17,11 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.arrays import Ints
+from survey.arrays import Bools, Ints
 from survey.clouds.pictures._kernels.lines import contrasts, keep_strongest, line_means, side_steps
 
 __all__ = [
     "ROUNDED",
+    "STEP_REACH",
     "WIDTH",
     "Field",
     "Strength",
@@ -47,11 +48,16 @@ _NO_STEP, _STEP = 2.0, 5.0  # steps of colour that texture makes, and that two s
 _SUREST_STEP = (
     0.5  # evidence of a step at most, over that of a usual joint: both edges of mortar are steps too
 )
+_BRIDGE = 2 * _SHORT[-1] * np.arange(-8, 9)  # and of 129 pixels, as far as joints go on behind what hides them
 _SPARSE = 4  # pixels from one line whose contrast is counted to the next
 _REACHES = (
     3,
     5,
 )  # distances of the sides from the middle of a line [px]: narrow joints, and up to three times wider
+
+
+STEP_REACH = _REACHES[0] + int(_SHORT[-1])
+"""Distance from a step up to which colours tell of it [px]."""
 
 
 @dataclass(frozen=True)
@@ -116,24 +122,44 @@ def grain_and_contrast(channel: Field) -> tuple[float, float]:
     return 1.25 * grain + ROUNDED, contrast
 
 
-def line_strength(image: Field) -> Strength:
+def line_strength(image: Field, hidden: Bools | None = None) -> Strength:
     """Measure the strength of joints, which are high in a picture.
 
     Parameters
     ----------
     image : (h, w) at a resolution at which joints are `WIDTH` pixels wide
+    hidden : (h, w) where joints cannot be seen: those that end there go straight on; None: nowhere
     """
+    covered = hidden is not None and hidden.any()
+    seen = np.ones_like(image) if hidden is None else (~hidden).astype(np.float32)
     best, angle, level, upright = (np.zeros_like(image) for _ in range(4))
     line, contrast, long = (np.empty_like(image) for _ in range(3))
     for turn in _turns(1):
         line_means(image, *_along(turn, _SHORT), line)
         contrasts(line, *_sides(turn, _REACHES), contrast)
-        line_means(contrast, *_along(turn, _LONG), long)
+        if not covered:
+            line_means(contrast, *_along(turn, _LONG), long)
+        else:
+            contrast *= seen
+            _seen_means(contrast, seen, _along(turn, _LONG), line, long)
         keep_strongest(contrast, long, np.float32(turn), best, angle)
+        if covered:
+            _seen_means(contrast, seen, _along(turn, _BRIDGE), line, long)
+            long[~hidden] = 0.0
+            keep_strongest(long, long, np.float32(turn), best, angle)
         for square, axis in ((level, 0.0), (upright, 0.5 * np.pi), (level, np.pi)):
             if abs(turn - axis) < _SQUARE:
                 np.maximum(square, contrast, out=square)
     return Strength(np.sqrt(best, out=best), upright, level, angle)
+
+
+def _seen_means(
+    contrast: Field, seen: Field, places: tuple[Ints, Ints], share: Field, out: Field
+) -> None:
+    """Compute the means of contrasts over what of a line is seen, or over a quarter of it if that is more."""
+    line_means(contrast, *places, out)
+    line_means(seen, *places, share)
+    out /= np.maximum(share, 0.25, out=share)
 
 
 def step_evidence(colours: NDArray[np.float32]) -> Field:

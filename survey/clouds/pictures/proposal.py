@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import bond_of, join_weak, renumbered
 from survey.clouds.pictures.channels import channels_of, grains, without_shade
-from survey.clouds.pictures.joints import WIDTH, Field, Strength, combined, line_strength, step_evidence
+from survey.clouds.pictures.joints import STEP_REACH, WIDTH, Field, Strength, combined, line_strength, step_evidence
 from survey.clouds.pictures.masonry import Named, name_stones
 from survey.clouds.pictures.photograph import Photograph
 from survey.clouds.pictures.regions import closed_regions, over_texture
@@ -256,6 +256,8 @@ class Fields:
 
 def measured_fields(photograph: Photograph, part: tuple[slice, slice], factor: float) -> Fields:
     """Measure a part of a picture, whose pixels become `factor` times as large."""
+    from scipy.ndimage import maximum_filter
+
     pixels = resized(photograph.pixels[part], factor)
     depth = None if photograph.depth is None else resized_field(photograph.depth[part], factor)
     left_out = None
@@ -264,15 +266,17 @@ def measured_fields(photograph: Photograph, part: tuple[slice, slice], factor: f
     channels, hidden, void = channels_of(pixels, depth, left_out)
     channels = without_shade(channels)
     image = combined(channels)
-    strength, colours = over_texture(line_strength(image)), grains(channels)
-    parting = np.maximum(strength.evidence, step_evidence(colours[_CHROMA]))
+    strength, colours = over_texture(line_strength(image, hidden)), grains(channels)
+    veil = maximum_filter(hidden, 2 * STEP_REACH + 1)
+    steps = np.where(veil, np.float32(0.0), step_evidence(colours[_CHROMA]))
+    parting = np.maximum(strength.evidence, steps)
     return Fields(image, strength, parting, hidden, void, colours)
 
 
 def joined_regions(fields: Fields, kind: str) -> Ints:
     """Return the regions (h, w) of a part of a picture, those that are one stone joined."""
     regions = closed_regions(fields.parting, fields.void)
-    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
     join_weak(bond)
     return renumbered(regions, bond)
 
@@ -305,7 +309,7 @@ def _kind_of(strength: Strength) -> str:
 
 def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     """Return the stones of regions, in pixels of the work."""
-    bond = bond_of(regions, fields.strength, fields.colours, kind)
+    bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
     shapes = outline_shapes(regions, without_mortar(regions, fields.image, _REACH[kind]))
     count = np.bincount(regions.ravel())
     veiled = np.bincount(regions.ravel(), fields.hidden.ravel().astype(np.float64), len(count))

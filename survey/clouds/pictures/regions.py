@@ -98,7 +98,9 @@ def closed_regions(evidence: Field, void: Bools) -> Ints:
     return flooded[1:-1, 1:-1].astype(np.int64)
 
 
-def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.float32]) -> Borders:
+def borders_of(
+    regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.float32], hidden: Bools
+) -> Borders:
     """Measure the borders between regions.
 
     Parameters
@@ -106,7 +108,9 @@ def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.f
     regions : (h, w) numbers; 0 is no region
     measures : (k, h, w) what is summed along borders; of two pixels on both sides the larger counts
     sides : (c, h, w) colours, of which the steps across borders are summed
+    hidden : (h, w) where colours are not seen
     """
+    seen = np.where(hidden, 0, regions)
     pairs, values, colours = [], [], []
     for axis in (1, 0):
         count = regions.shape[axis]
@@ -117,7 +121,7 @@ def borders_of(regions: Ints, measures: NDArray[np.float32], sides: NDArray[np.f
         larger = np.maximum(_at(measures, at, axis, 0), _at(measures, at, axis, 1)).T
         values.append(np.column_stack([larger, np.full(len(first), float(axis))]))
         before, behind = -_REACH, 1 + _REACH
-        inside = (_at(regions, at, axis, before) == first) & (_at(regions, at, axis, behind) == second)
+        inside = (_at(seen, at, axis, before) == first) & (_at(seen, at, axis, behind) == second)
         turned = np.where(first < second, inside, -1.0 * inside)
         steps = (_at(sides, at, axis, behind) - _at(sides, at, axis, before)) * turned
         colours.append(np.column_stack([inside, steps.T]))

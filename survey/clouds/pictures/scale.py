@@ -43,7 +43,9 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
     if not widths:
         return WIDTH, 0.0
     best = max(ratio for _, ratio in widths)
-    return next(width for width, ratio in widths if ratio >= min(_GOOD * best, best)), best
+    good = [width for width, ratio in widths if ratio >= min(_GOOD * best, best)]
+    # pixels between those of a picture show nothing more
+    return next((width for width in good if width >= WIDTH), good[0]), best
 
 
 def _parts(shape: tuple[int, ...], side: int) -> Iterator[tuple[slice, slice]]:
