@@ -1,6 +1,7 @@
 """Stones without their mortar: masks, outlines with straight sides, and how sure their corners are."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ __all__ = ["Shape", "outline_shapes", "without_mortar"]
 _STRAIGHT = 1.5  # distance of a traced boundary from the sides of its outline [px of the work]
 _MIN_CORNERS = 4  # corners of an outline that has none to spare
 _BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint
+_SIDE = 4.0  # length of what is seen of a side, over the width of a joint, from which it goes straight on when hidden
 _SQUARE = 0.6  # sine of the angle between the sides beside it: 37°
 _MIN_STONE_WIDTH = 1.5  # width of a stone over that of a joint
 _SEEN = 0.25  # contrast of mortar over the scatter of the wall from which its edge can be seen
@@ -77,16 +79,18 @@ def _spread(image: Field, where: Bools, reach: float) -> Field:
     return out
 
 
-def outline_shapes(regions: Ints, stone: Bools) -> list[Shape]:
-    """Trace the stone of each region with straight sides.
+def outline_shapes(regions: Ints, stone: Bools, hidden: Bools) -> list[Shape]:
+    """Trace the stone of each region with straight sides, which go straight on where they are hidden.
 
     Parameters
     ----------
     regions : (h, w) numbers
     stone : (h, w) where there is stone
+    hidden : (h, w) where joints cannot be seen
     """
-    from scipy.ndimage import binary_fill_holes, binary_opening, find_objects
+    from scipy.ndimage import binary_fill_holes, binary_opening, find_objects, maximum_filter
 
+    veil = maximum_filter(hidden, 2 * round(WIDTH) + 1)
     out = []
     for number, box in enumerate(find_objects(regions), start=1):
         if box is None:
@@ -98,12 +102,55 @@ def outline_shapes(regions: Ints, stone: Bools) -> list[Shape]:
         dense, _, _ = trace(mask)
         if len(dense) < 3:
             continue
+        dense = _straight_behind(dense, np.pad(veil[box], 1, mode="edge"))
         ring = _sharp(few_corners(dense, _STRAIGHT))
         if abs(ring_area(ring)) < (_MIN_STONE_WIDTH * WIDTH) ** 2:
             continue
         sigma = float(np.hypot(_PIXEL, _scatter(dense, ring)))
         out.append(Shape(number, ring + np.array([box[1].start - 1, box[0].start - 1]), sigma))
     return out
+
+
+def _straight_behind(dense: Array, veil: Bools) -> Array:
+    """Return a boundary (n, 2) whose sides go straight on behind a veil (h, w), where they meet or are one."""
+    columns, rows = np.round(dense).astype(int).T
+    hidden = veil[rows, columns]
+    if not hidden.any() or hidden.all():
+        return dense
+    first = int(np.flatnonzero(~hidden & np.roll(hidden, 1))[0])
+    dense, hidden = np.roll(dense, -first, axis=0), np.roll(hidden, -first)
+    ends = [0, *(np.flatnonzero(np.diff(hidden)) + 1).tolist(), len(dense)]
+    parts = [dense[a:b] for a, b in pairwise(ends)]  # seen and hidden by turns
+    for k in range(0, len(parts), 2):
+        parts[k + 1] = _between(parts[k], parts[k + 1], parts[(k + 2) % len(parts)], veil)
+    return np.concatenate(parts)
+
+
+def _between(before: Array, hidden: Array, after: Array, veil: Bools) -> Array:
+    """Return what is between two seen parts of a boundary: nothing if they are one side, their corner, or what is traced."""
+    span = round(_SIDE * WIDTH)
+    if min(len(before), len(after)) < span:
+        return hidden
+    (p, a, apart), (q, b, further) = _line(before[-span:]), _line(after[:span])
+    if max(apart, further) > _STRAIGHT:
+        return hidden
+    turn = float(a[0] * b[1] - a[1] * b[0])
+    off = q - p
+    if abs(turn) < _SQUARE:
+        one_side = abs(float(a[0] * off[1] - a[1] * off[0])) < _STRAIGHT + abs(turn) * float(np.hypot(*off))
+        return hidden[:0] if one_side else hidden
+    corner = p + float(off[0] * b[1] - off[1] * b[0]) / turn * a
+    column, row = np.round(corner).astype(int)
+    within = 0 <= row < veil.shape[0] and 0 <= column < veil.shape[1] and veil[row, column]
+    return corner[None] if within else hidden
+
+
+def _line(points: Array) -> tuple[Array, Array, float]:
+    """Fit a line: a point of it, its unit direction, and the largest distance of the points from it."""
+    middle = points.mean(axis=0)
+    direction = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    apart = (points - middle) @ np.array([-direction[1], direction[0]])
+    return middle, direction, float(np.abs(apart).max())
 
 
 def _sharp(ring: Array) -> Array:
