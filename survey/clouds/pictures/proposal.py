@@ -310,7 +310,8 @@ def _kind_of(strength: Strength) -> str:
 def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:
     """Return the stones of regions, in pixels of the work."""
     bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
-    shapes = outline_shapes(regions, without_mortar(regions, fields.image, _REACH[kind]), fields.hidden)
+    stone = without_mortar(regions, fields.image, fields.hidden, _REACH[kind])
+    shapes = outline_shapes(regions, stone, fields.hidden)
     count = np.bincount(regions.ravel())
     veiled = np.bincount(regions.ravel(), fields.hidden.ravel().astype(np.float64), len(count))
     shapes = [shape for shape in shapes if veiled[shape.number] <= _HIDDEN * count[shape.number]]

@@ -41,13 +41,14 @@ class Shape:
     sigma: float
 
 
-def without_mortar(regions: Ints, image: Field, reach: float) -> Bools:
+def without_mortar(regions: Ints, image: Field, hidden: Bools, reach: float) -> Bools:
     """Return where (h, w) there is stone: what within a region is nearer to its inside than to its joints.
 
     Parameters
     ----------
     regions : (h, w) numbers; 0 is no region
     image : (h, w) in which joints are high
+    hidden : (h, w) where joints cannot be seen: they are of the usual width there
     reach : farthest distance of mortar from the middle of a joint, over the width of a joint
     """
     from scipy.ndimage import distance_transform_edt, gaussian_filter, maximum_filter
@@ -64,6 +65,7 @@ def without_mortar(regions: Ints, image: Field, reach: float) -> Bools:
     joint = _spread(maximum_filter(smooth, 3), border & (regions > 0), 2.5 * WIDTH)
     contrast = joint - stone
     mortar = (smooth - stone > 0.5 * contrast) & (contrast > _SEEN) & (distance <= reach * WIDTH)
+    mortar = np.where(hidden, distance <= 0.5 * WIDTH, mortar)
     return np.asarray((regions > 0) & ~border & ~mortar, dtype=np.bool_)
 
 
