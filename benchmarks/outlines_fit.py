@@ -60,7 +60,9 @@ def _stayed(fields: Fields, true: Ints, kind: str, weights: Array, missing: Arra
     if missing is not None:
         regions = propose_missing(regions, fields.strength, fields.hidden, weights=missing)
     bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
-    return [(np.array([1.0, terms @ weights]), different) for terms, different in _samples(bond, regions, true)]
+    return [
+        (np.array([1.0, terms @ weights]), different) for terms, different in _samples(bond, regions, true)
+    ]
 
 
 def _walls(seed: int, weathered: bool) -> Iterator[tuple[str, Fields, Ints]]:

@@ -5,7 +5,7 @@ import pytest
 
 from tests.paths import ROOT
 
-pytest.importorskip("skimage")
+pytest.importorskip("shapely")
 
 PHOTOGRAPHS = ROOT.parent / "shared/data/segmentation"
 

@@ -15,7 +15,7 @@ TEXT = (ROOT / PAGE).read_text(encoding="utf-8")
 
 @pytest.mark.slow
 def test_the_commands_take_a_scan_to_stones(tmp_path):
-    pytest.importorskip("skimage")
+    pytest.importorskip("shapely")
     lines = [
         line for block in blocks(PAGE, "bash") for line in block.splitlines() if line.startswith("moma ")
     ]

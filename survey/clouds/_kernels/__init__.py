@@ -1,1 +1,1 @@
-"""Numba kernels of clouds: points into stones, and planes of their patches."""
+"""Numba kernels of clouds: points into stones, planes of their patches, lines and regions of their pictures."""

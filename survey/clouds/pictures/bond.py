@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from survey.arrays import Array, Bools, Ints
-from survey.clouds.pictures.joints import WIDTH, Strength
+from survey.clouds.pictures.joints import STRONGEST, WIDTH, Strength
 from survey.clouds.pictures.regions import borders_of
 
-__all__ = ["FEATURES", "LIKELY", "WEIGHTS", "Bond", "Border", "bond_of", "join_weak", "renumbered"]
+__all__ = ["FEATURES", "GAP", "LIKELY", "WEIGHTS", "Bond", "Border", "bond_of", "join_weak", "renumbered"]
 
 FEATURES = ("constant", "strength", "gaps", "fuller", "askew", "size", "step")
 """Names of what the probability depends on."""
@@ -36,12 +36,13 @@ WEIGHTS: Mapping[str, tuple[float, ...]] = MappingProxyType(
 """Weights by the kind of masonry, of missing joints, and of all borders that stay, that
 `python -m benchmarks.outlines --fit` fits."""
 
+GAP = 0.25
+"""Strength over that of a usual joint below which there is none."""
+
 LIKELY = 0.6
 """Probability from which a border stays. Photographs have blots that rendered walls lack: on twelve of them 6 % of
 the stones are split at 0.5, 2 % at 0.6, 1 % at 0.7, where one in 138 fewer is found."""
 
-_STRONGEST = 1.5  # strength over that of a usual joint above which more says nothing
-_GAP = 0.25  # strength over that of a usual joint below which there is none
 _LARGE = 20.0  # size of a region over the width of a joint from which it is surely no fragment
 
 
@@ -139,10 +140,10 @@ def bond_of(
     """
     from scipy.ndimage import find_objects
 
-    ratio = np.minimum(strength.evidence, _STRONGEST).astype(np.float32)
+    ratio = np.minimum(strength.evidence, STRONGEST).astype(np.float32)
     rows, columns = (index.astype(np.float32) for index in np.indices(regions.shape))
     # what is not seen is as likely a joint as none
-    joint = np.where(hidden, np.float32(0.5), ratio >= _GAP).astype(np.float32)
+    joint = np.where(hidden, np.float32(0.5), ratio >= GAP).astype(np.float32)
     ratio[hidden] = 0.5
     found = borders_of(regions, np.stack([ratio, joint, rows, columns]), colours, hidden)
     sums = found.sums.copy()

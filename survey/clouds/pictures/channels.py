@@ -18,7 +18,6 @@ _BEFORE = (
 _GREEN = 11.0  # by which leaves are greener than the wall [units of a*]: 2.3 are just seen
 _DENSE = 0.3  # part of the pixels before the wall from which it is hidden
 _LEAST = 8.0  # width of an opening over that of a joint
-_MIDDLE = (25.0, 75.0)  # per cent of the depths of a wall between which those of its faces lie
 
 
 def channels_of(

@@ -18,11 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Bools, Ints
-from survey.clouds.pictures._kernels.lines import contrasts, keep_strongest, line_means, side_steps
+from survey.clouds._kernels.lines import contrasts, keep_strongest, line_means, side_steps
 
 __all__ = [
+    "DIRECTION",
     "ROUNDED",
     "STEP_REACH",
+    "STRONGEST",
     "WIDTH",
     "Field",
     "Strength",
@@ -35,26 +37,32 @@ __all__ = [
 WIDTH = 3.0
 """Width of a joint at the resolution of the work [px]."""
 
+STRONGEST = 1.5
+"""Strength over that of a usual joint above which more says nothing."""
+
 ROUNDED = 0.3
 """Noise that rounding to 8 bits leaves in a channel [units of L*, and of depth over its noise]."""
 
 Field = NDArray[np.float32]
 
-_DIRECTIONS = 16  # over half a turn: 11° apart, so that a line of 8 pixels leaves its pixels by less than one
+_DIRECTIONS = 16  # over half a turn: 11° apart, so that a line of 9 pixels leaves its pixels by less than one
 _SQUARE = np.radians(25.0)  # angle from the horizontal of beds, and of head joints from the vertical, at most
+_SPARSE = 4  # pixels from one line to the next, whose mean is about the same
 _SHORT = np.arange(-4, 5)  # places along a short line [px]
-_LONG = 4 * _SHORT  # and along one of 33 pixels: a mean along a short line is about that of the next few
+_LONG = _SPARSE * _SHORT  # along one of 33 pixels, of means along short lines
+_BRIDGE = np.arange(-64, 65, 8)  # and of 129 pixels, as far as joints go on behind what hides them
 _NO_STEP, _STEP = 2.0, 5.0  # steps of colour that texture makes, and that two stones make [grains]
 _SUREST_STEP = (
     0.5  # evidence of a step at most, over that of a usual joint: both edges of mortar are steps too
 )
-_BRIDGE = 2 * _SHORT[-1] * np.arange(-8, 9)  # and of 129 pixels, as far as joints go on behind what hides them
-_SPARSE = 4  # pixels from one line whose contrast is counted to the next
 _REACHES = (
     3,
     5,
 )  # distances of the sides from the middle of a line [px]: narrow joints, and up to three times wider
 
+
+DIRECTION = np.pi / _DIRECTIONS
+"""Angle from one direction of lines to the next [rad]."""
 
 STEP_REACH = _REACHES[0] + int(_SHORT[-1])
 """Distance from a step up to which colours tell of it [px]."""
@@ -130,8 +138,8 @@ def line_strength(image: Field, hidden: Bools | None = None) -> Strength:
     image : (h, w) at a resolution at which joints are `WIDTH` pixels wide
     hidden : (h, w) where joints cannot be seen: those that end there go straight on; None: nowhere
     """
-    covered = hidden is not None and hidden.any()
-    seen = np.ones_like(image) if hidden is None else (~hidden).astype(np.float32)
+    veil = np.zeros(image.shape, dtype=np.bool_) if hidden is None else hidden
+    covered, seen = veil.any(), (~veil).astype(np.float32)
     best, angle, level, upright = (np.zeros_like(image) for _ in range(4))
     line, contrast, long = (np.empty_like(image) for _ in range(3))
     for turn in _turns(1):
@@ -145,7 +153,7 @@ def line_strength(image: Field, hidden: Bools | None = None) -> Strength:
         keep_strongest(contrast, long, np.float32(turn), best, angle)
         if covered:
             _seen_means(contrast, seen, _along(turn, _BRIDGE), line, long)
-            long[~hidden] = 0.0
+            long[~veil] = 0.0
             keep_strongest(long, long, np.float32(turn), best, angle)
         for square, axis in ((level, 0.0), (upright, 0.5 * np.pi), (level, np.pi)):
             if abs(turn - axis) < _SQUARE:
@@ -153,9 +161,7 @@ def line_strength(image: Field, hidden: Bools | None = None) -> Strength:
     return Strength(np.sqrt(best, out=best), upright, level, angle)
 
 
-def _seen_means(
-    contrast: Field, seen: Field, places: tuple[Ints, Ints], share: Field, out: Field
-) -> None:
+def _seen_means(contrast: Field, seen: Field, places: tuple[Ints, Ints], share: Field, out: Field) -> None:
     """Compute the means of contrasts over what of a line is seen, or over a quarter of it if that is more."""
     line_means(contrast, *places, out)
     line_means(seen, *places, share)
@@ -192,14 +198,16 @@ def step_evidence(colours: NDArray[np.float32]) -> Field:
 
 def _turns(every: int) -> Iterator[float]:
     """Yield every so many of the directions of lines [rad]."""
-    yield from (np.pi * np.arange(0, _DIRECTIONS, every) / _DIRECTIONS).tolist()
+    yield from (DIRECTION * np.arange(0, _DIRECTIONS, every)).tolist()
 
 
 def _along(turn: float, places: Ints) -> tuple[Ints, Ints]:
-    """Return rows and columns from a pixel to places along a line; rows grow downwards, where a line that rises has fewer."""
+    """Return rows and columns from a pixel to places along a line; a line that rises has fewer rows."""
     down, right = -np.sin(turn), np.cos(turn)
     larger = max(abs(down), abs(right))
-    return np.round(places * down / larger).astype(np.int64), np.round(places * right / larger).astype(np.int64)
+    return np.round(places * down / larger).astype(np.int64), np.round(places * right / larger).astype(
+        np.int64
+    )
 
 
 def _sides(turn: float, reaches: tuple[int, ...]) -> tuple[Ints, Ints]:

@@ -162,9 +162,10 @@ def _around(rings: Sequence[Array], boxes: Array, opening: Array, kinds: list[st
                 kinds[k] = "voussoir"
             elif across > 0.9 * width and y0 > top - reach:
                 kinds[k] = "lintel"
-        at_side = min(abs(x1 - left), abs(x0 - right)) < reach
-        if not kinds[k] and coursed and at_side and beside > _BESIDE * (y1 - y0):
-            kinds[k] = "jamb"
+        if not kinds[k] and coursed and beside > _BESIDE * (y1 - y0):
+            start, stop = _width_at(ring, 0.5 * (min(y1, top) + max(y0, bottom)))
+            if min(abs(stop - left), abs(start - right)) < reach:
+                kinds[k] = "jamb"
     for k, ring in enumerate(rings):
         beside = [j for j in over if _touch(boxes[j], boxes[k], _TOUCHES * (boxes[k, 1, 1] - boxes[k, 0, 1]))]
         if kinds[k] in ("", "jamb") and beside and _radial_sides(ring, _STEEP) == 1:
@@ -176,6 +177,16 @@ def _around(rings: Sequence[Array], boxes: Array, opening: Array, kinds: list[st
             best = min(crown, key=lambda k: abs(float(boxes[k, :, 0].mean()) - middle))
             if abs(float(boxes[best, :, 0].mean()) - middle) < 0.25 * (boxes[best, 1, 0] - boxes[best, 0, 0]):
                 kinds[best] = "keystone"
+
+
+def _width_at(ring: Array, height: float) -> tuple[float, float]:
+    """Return where a level line enters and leaves a stone."""
+    after = np.roll(ring, -1, axis=0)
+    low, high = ring[:, 1] - height, after[:, 1] - height
+    crossed = (low > 0.0) != (high > 0.0)
+    share = low[crossed] / (low - high)[crossed]
+    places = ring[crossed, 0] + share * (after - ring)[crossed, 0]
+    return float(places.min()), float(places.max())
 
 
 def _corners(boxes: Array, courses: Sequence[Sequence[int]], kinds: list[str], cut: Sequence[bool]) -> None:

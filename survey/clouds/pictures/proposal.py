@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import bond_of, join_weak, renumbered
 from survey.clouds.pictures.channels import channels_of, grains, without_shade
-from survey.clouds.pictures.joints import STEP_REACH, WIDTH, Field, Strength, combined, line_strength, step_evidence
+from survey.clouds.pictures.joints import (
+    DIRECTION,
+    STEP_REACH,
+    WIDTH,
+    Field,
+    Strength,
+    combined,
+    line_strength,
+    step_evidence,
+)
 from survey.clouds.pictures.masonry import Named, name_stones
 from survey.clouds.pictures.photograph import Photograph
 from survey.clouds.pictures.regions import closed_regions, over_texture
@@ -34,7 +43,9 @@ __all__ = [
 _REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
 _HIDDEN = 0.6  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
-_COURSED = 0.5  # part of the strong joints that are level or upright, from which there are courses
+_COURSED = (
+    0.5  # part of the strong joints that are of one direction or square to it, from which there are courses
+)
 _CHROMA = slice(1, 3)  # channels of a* and b*: those of lightness step at every edge of a shade
 _OPEN = 6.0  # size of an opening over the width of a joint
 
@@ -298,13 +309,13 @@ def _tile(
 
 
 def _kind_of(strength: Strength) -> str:
-    """Return whether joints are level and upright, as in courses, or of all directions, as in rubble."""
+    """Return whether joints are of one direction and square to it, as in courses, or of all, as in rubble."""
     strong = strength.evidence > 0.6
     if not strong.any():
         return "coursed"
-    angle, weight = strength.angle[strong], strength.evidence[strong]
-    square = np.minimum(np.abs(np.sin(angle)), np.abs(np.cos(angle))) < 0.1  # of the directions, 11° apart, two
-    return "coursed" if float(weight[square].sum() / weight.sum()) > _COURSED else "rubble"
+    quarter = np.round(strength.angle[strong] / DIRECTION).astype(int) % round(0.5 * np.pi / DIRECTION)
+    share = np.bincount(quarter, strength.evidence[strong])
+    return "coursed" if float(share.max() / share.sum()) > _COURSED else "rubble"
 
 
 def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:

@@ -13,7 +13,9 @@ __all__ = ["joint_width", "resized", "resized_field"]
 _WIDTHS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)  # widths of joints that are tried [px]
 _SAMPLE = 512  # side of the parts of a picture that they are tried on, at most [px]
 _ENOUGH = 128.0  # side over the width of a joint from which a part is no larger: some courses of some stones
-_AGREE = 2  # of five parts that show joints of a width: others may show a door, one may show a bush or a scaffold
+_AGREE = (
+    2  # of five parts that show joints of a width: others may show a door, one may show a bush or a scaffold
+)
 _GOOD = 0.5  # of the best contrast over grain, from which a finer resolution is preferred: it has the better edges
 
 

@@ -129,7 +129,7 @@ def _straight_behind(dense: Array, veil: Bools) -> Array:
 
 
 def _between(before: Array, hidden: Array, after: Array, veil: Bools) -> Array:
-    """Return what is between two seen parts of a boundary: nothing if they are one side, their corner, or what is traced."""
+    """Return what is between two seen parts of a boundary: nothing if they are one side, else their corner."""
     span = round(_SIDE * WIDTH)
     if min(len(before), len(after)) < span:
         return hidden

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from survey.arrays import Array, Bools, Ints
-from survey.clouds.pictures.bond import LIKELY, WEIGHTS
-from survey.clouds.pictures.joints import WIDTH, Field, Strength
+from survey.clouds.pictures.bond import GAP, LIKELY, WEIGHTS
+from survey.clouds.pictures.joints import STRONGEST, WIDTH, Field, Strength
 
 __all__ = ["Line", "line_features", "lines_across", "propose_missing"]
 
 _ACROSS = 0.6  # part of the height of a region that a line crosses at least
 _LEAN = 4  # pixels by which the ends of a line lean to either side
 _CLEAR = 2.0  # distance from the ends of a region over the width of a joint
-_STRONGEST, _GAP = 1.5, 0.25  # as along borders
 _MAX_LINES = 6  # lines across one region at most
 
 
@@ -111,7 +110,7 @@ def _lines(
     """Yield the axis, the region, the part beyond and the line: upright (1) and level (0, transposed)."""
     mask = regions[box] == number
     for axis, field in ((1, strength.upright), (0, strength.level)):
-        ratio, whole, veil = np.minimum(field[box], _STRONGEST), mask, hidden[box]
+        ratio, whole, veil = np.minimum(field[box], STRONGEST), mask, hidden[box]
         if axis == 0:
             ratio, whole, veil = ratio.T, whole.T, veil.T
         line = _best_line(ratio, whole, veil)
@@ -131,9 +130,11 @@ def _best_line(ratio: Field, mask: Bools, hidden: Bools) -> Line | None:
         return None
     wide = maximum_filter1d(ratio, 3, axis=1)
     # the joints at the sides of a region are no joints within it
-    seen = minimum_filter1d(mask.view(np.uint8), 2 * clear + 1, axis=1, mode="constant").view(np.bool_) & ~hidden
+    seen = (
+        minimum_filter1d(mask.view(np.uint8), 2 * clear + 1, axis=1, mode="constant").view(np.bool_) & ~hidden
+    )
     sums = np.zeros((3, rows + 1, columns), dtype=np.float32)
-    np.cumsum(np.stack([seen, wide * seen, (wide < _GAP) & seen]), axis=1, out=sums[:, 1:])
+    np.cumsum(np.stack([seen, wide * seen, (wide < GAP) & seen]), axis=1, out=sums[:, 1:])
     best: Line | None = None
     for lean in range(-_LEAN, _LEAN + 1, 2):
         count, total, lack = _along(sums, lean)

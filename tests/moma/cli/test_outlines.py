@@ -10,7 +10,7 @@ from survey.clouds.outlines.reading import read_outlines
 from tests.moma.commands import invoke, prints
 from tests.survey.clouds.pictures.walls import courses, painted
 
-pytest.importorskip("skimage")
+pytest.importorskip("shapely")
 pytestmark = pytest.mark.slow
 
 HOSTILE = '</script><script>alert(1)</script><img src=x onerror="alert(2)">'

@@ -9,7 +9,7 @@ from survey.clouds.pictures.proposal import propose_outlines
 from survey.clouds.settings import OutlineSettings
 from tests.survey.clouds.pictures.walls import as_picture, courses, found_overlaps, painted, photograph
 
-pytest.importorskip("skimage")
+pytest.importorskip("shapely")
 pytestmark = pytest.mark.slow  # each takes about a second
 
 BOXES, SHAPE = courses()

@@ -1,1 +1,0 @@
-"""Numba kernels of pictures: contrasts along lines, and regions that are flooded."""
