@@ -39,8 +39,9 @@ def with_role(
 ) -> ColumnMap:
     """Return the map of the columns with the one whose values are all roles of points as the role.
 
-    It may have any name, also one of kinds, numbers or names of points. Words of one letter, which may number points,
-    and numbered words are roles where there are some of corners and some of points on faces: E1, E2, E3, M.
+    It may have any name, also one of kinds, numbers or names of points. Words of one letter, which may number points or
+    abbreviate kinds, and numbered words are roles where stones have some of corners and some of points on the face:
+    E1, E2, E3, M. A column that never differs within a stone is of the stone.
     """
     known = [kind_of_column(name) if name else "" for name in names]
     if "role" in (*known, *column_map.names) or column_map.numbered or (codes and "description" in known):
@@ -49,29 +50,62 @@ def with_role(
         k for k, what in enumerate(known) if what in (None, "kind", "name") and names.count(names[k]) == 1
     ]
     free = [k for k in free if names[k] not in column_map.names.values()]
-    words: dict[int, set[str]] = {k: set() for k in free}
-    for i, (number, row) in enumerate(ahead):
-        with suppress(SurveyError):  # told when the row is read
-            values = rows.cells(row, number)
-            for k in free:
-                word = values[k].casefold() if k < len(values) else ""
-                words[k] |= {word} if word or i else set()  # the first row may hold units
-    known_roles = roles_with(own_words)
+    by_stone = _words_of_stones(rows, ahead, free, _places_of_stones(names, known, column_map))
+    words = {k: set[str]().union(*(stone[k] for stone in by_stone.values())) for k in free}
+    all_roles = roles_with(own_words)
     roles = [
         k
         for k in free
-        if words[k]
-        and (
-            words[k] <= _ROLE_WORDS | own_words.keys()
-            or {"vertex", "point"} <= {role_of(word, known_roles) for word in words[k]} <= _OF_STONES
-        )
+        if words[k] and _are_roles([stone[k] for stone in by_stone.values()], all_roles, own_words)
     ]
     if not roles:
-        asked = {names[k]: words[k] for k in free if not {plain(names[k]), "*"} & column_map.ignored}
-        _check_words(rows.path, asked, known_roles)
+        differing = [k for k in free if any(len(stone[k]) > 1 for stone in by_stone.values())]
+        asked = {names[k]: words[k] for k in differing if not {plain(names[k]), "*"} & column_map.ignored}
+        _check_words(rows.path, asked, all_roles)
     if len(roles) != 1:
         return column_map
     return replace(column_map, names={**column_map.names, "role": names[roles[0]]})
+
+
+def _places_of_stones(
+    names: Sequence[str], kinds: Sequence[str | None], column_map: ColumnMap
+) -> tuple[int, ...]:
+    """Return the columns that name the stones."""
+    stated = column_map.names.get("block", "")
+    wanted = (stated, *stated.split("+"))
+    places = tuple(k for k, name in enumerate(names) if name in wanted)
+    return (
+        places or tuple(kinds.index(what) for what in ("block", "description", "name") if what in kinds)[:1]
+    )
+
+
+def _words_of_stones(
+    rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Sequence[int], stones: Sequence[int]
+) -> dict[tuple[str, ...], dict[int, set[str]]]:
+    """Return the words in columns by the name of a stone, which may stand in its first row alone."""
+    words: dict[tuple[str, ...], dict[int, set[str]]] = {}
+    stone: tuple[str, ...] = ()
+    for i, (number, row) in enumerate(ahead):
+        with suppress(SurveyError):  # told when the row is read
+            values = [*rows.cells(row, number), *[""] * (1 + max(columns, default=0))]
+            named = tuple(values[k] for k in stones if k < len(values))
+            stone = named if any(named) else stone
+            of_stone = words.setdefault(stone, {k: set() for k in columns})
+            for k in columns:
+                word = values[k].casefold()
+                of_stone[k] |= {word} if word or i else set()  # the first row may hold units
+    return words
+
+
+def _are_roles(stones: Sequence[Set[str]], roles: Mapping[str, str], own_words: Mapping[str, str]) -> bool:
+    """Return whether the words of a column, by stone, are all roles of points."""
+    words = set[str]().union(*stones)
+    found = {role_of(word, roles) for word in words}
+    if not found <= _OF_STONES:
+        return False
+    differ = any({"vertex", "point"} <= {role_of(word, roles) for word in stone} for stone in stones)
+    clear = words <= _ROLE_WORDS | own_words.keys()
+    return differ or (clear and not {"vertex", "point"} <= found)
 
 
 def _check_words(path: str, columns: Mapping[str, Set[str]], roles: Mapping[str, str]) -> None:

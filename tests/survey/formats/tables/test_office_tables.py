@@ -421,3 +421,21 @@ def test_heights_say_what_they_are_counted_from(tmp_path, height, scale):
     path = table(tmp_path / "a.csv", ["Stein", "Rolle", "Ost", "Nord", height], cells)
     (stone, *_) = open_csv(path).blocks
     assert stone.vertices[2].tolist() == pytest.approx([1.1, 0.002, 0.65])
+
+
+@pytest.mark.parametrize(
+    ("title", "words", "kinds"),
+    [
+        ("Art", ("L", "B", "F", "L"), {"stretcher", "header", "infill"}),
+        ("Art", ("E", "P", "E", "P"), {"quoin", "slab"}),
+        ("Position", ("Rand", "Mitte", "Rand", "Mitte"), {"ashlar"}),
+        ("Position", ("Rand", "oben", "Rand", "oben"), {"ashlar"}),
+    ],
+)
+def test_words_that_never_differ_within_a_stone_are_no_roles(tmp_path, title, words, kinds):
+    word = dict(zip(FACES, words, strict=True))
+    cells = [[code, word[code], *map(str, place)] for code, role, *place in POINTS if role == "E"]
+    abbreviations = {"l": "stretcher", "b": "header", "f": "infill", "e": "quoin", "p": "slab"}
+    found = read(table(tmp_path / "a.csv", ["Stein", title, "x", "y", "z"], cells), kinds=abbreviations)
+    assert {code: one[:2] for code, one in found.items()} == dict.fromkeys(FACES, (4, 0))
+    assert {one[2] for one in found.values()} == kinds
