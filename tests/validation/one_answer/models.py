@@ -68,7 +68,7 @@ MODELS: Mapping[str, Model] = {
     "dome": Model(snap=0.003, above=1.04),
     "crossvault": Model(snap=0.003),
     "buttresses": Model(0.6),
-    "pavillion": Model(0.7, above=1.04),
+    "pavillion": Model(0.7, above=1.2),
 }
 
 
