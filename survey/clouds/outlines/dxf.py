@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ground.errors import SurveyError
+from ground.tables.columns import UNITS
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.dxf_entities import Curve, DrawnText, Entities, entities_of
@@ -20,12 +21,16 @@ from survey.geometry.solids import area_vector
 
 __all__ = ["read_dxf"]
 
-_FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # [m]
 _UNITS = {
-    1: _FOOT / 12.0, 2: _FOOT, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 9: _FOOT / 12e3, 10: 3.0 * _FOOT,
-    14: 0.1, 15: 10.0, 16: 100.0, 21: _SURVEY_FOOT, 22: _SURVEY_FOOT / 12.0, 23: 3.0 * _SURVEY_FOOT,
-}  # fmt: skip
-"""$INSUNITS: length of a unit [m]."""
+    "Millimeters": "mm",
+    "Centimeters": "cm",
+    "Decimeters": "dm",
+    "Meters": "m",
+    "Inches": "in",
+    "Feet": "ft",
+    "USSurveyFeet": "us-ft",
+}
+"""Units of length by their names in ezdxf."""
 _LISTED = 6  # labels in a message
 _FRAMED = 3  # texts of other outlines within an outline that is no stone
 
@@ -62,14 +67,7 @@ def read_dxf(
         if it is not a drawing, has no closed curve, or states a unit that is not known
     """
     drawing, entities = _opened(path, layer)
-    code = int(drawing.header.get("$INSUNITS", 0))
-    if unit is None and code and code not in _UNITS:
-        raise SurveyError(
-            f"its unit has the number {code} ($INSUNITS), which is none of masonry",
-            where=str(path),
-            remedy="state the unit of its lengths, e.g. --unit m",
-        )
-    scale = unit or _UNITS.get(code, 1.0)
+    scale = unit or _stated_unit(drawing, path)
     if not entities.curves:
         raise _empty(path, layer, entities)
     drawn = _without_symbols(entities.curves)
@@ -80,6 +78,19 @@ def read_dxf(
     stones = [k for k, curve in enumerate(curves) if not curve.chained or _is_stone(k, labels, around, texts)]
     left += _astray(texts, labels, len(curves) - len(stones))
     return tuple(_coded(curves, stones, labels, around, chosen, kinds or {}, path)), tuple(left)
+
+
+def _stated_unit(drawing: Any, path: Path) -> float:
+    """Return the length of a drawing's unit [m]; a metre where it states none."""
+    code = int(drawing.header.get("$INSUNITS", 0))
+    name = {int(unit): unit.name for unit in optional("ezdxf.enums", "DXF files").InsertUnits}.get(code, "")
+    if code and name not in _UNITS:
+        raise SurveyError(
+            f"its unit has the number {code} ($INSUNITS), which is none of masonry",
+            where=str(path),
+            remedy="state the unit of its lengths, e.g. --unit m",
+        )
+    return UNITS[_UNITS[name]] if code else 1.0
 
 
 def _opened(path: Path, layer: str | None) -> tuple[Any, Entities]:

@@ -95,7 +95,7 @@ def test_a_drawing_whose_stones_are_all_hidden_names_the_layer(drawing):
 
 
 @pytest.mark.parametrize(
-    ("code", "length"), [(0, 1.0), (4, 0.001), (2, 0.3048), (21, FOOT), (22, FOOT / 12), (10, 0.9144)]
+    ("code", "length"), [(0, 1.0), (4, 0.001), (1, 0.0254), (2, 0.3048), (14, 0.1), (21, FOOT)]
 )
 def test_units_of_drawings(drawing, code, length):
     drawing.header["$INSUNITS"] = code
@@ -106,10 +106,11 @@ def test_units_of_drawings(drawing, code, length):
     assert np.ptp(one.corners[:, 0]) == pytest.approx(0.005, rel=1e-12)
 
 
-def test_a_unit_of_no_masonry_is_asked_for(drawing):
-    drawing.header["$INSUNITS"] = 18
+@pytest.mark.parametrize("code", [7, 18, 99])
+def test_a_unit_of_no_masonry_is_asked_for(drawing, code):
+    drawing.header["$INSUNITS"] = code
     square(drawing.modelspace())
-    with pytest.raises(SurveyError, match=r"number 18.*--unit m"):
+    with pytest.raises(SurveyError, match=rf"number {code} .*--unit m"):
         drawing.read()
     assert len(drawing.read(unit=1.0).outlines) == 1
 
