@@ -141,11 +141,10 @@ def bond_of(
     from scipy.ndimage import find_objects
 
     ratio = np.minimum(strength.evidence, STRONGEST).astype(np.float32)
-    rows, columns = (index.astype(np.float32) for index in np.indices(regions.shape))
     # what is not seen is as likely a joint as none
     joint = np.where(hidden, np.float32(0.5), ratio >= GAP).astype(np.float32)
     ratio[hidden] = 0.5
-    found = borders_of(regions, np.stack([ratio, joint, rows, columns]), colours, hidden)
+    found = borders_of(regions, np.stack([ratio, joint]), colours, hidden)
     sums = found.sums.copy()
     sums[:, 1] = found.lengths - sums[:, 1]  # a gap where neither side has a joint
     borders: dict[int, dict[int, Border]] = {}

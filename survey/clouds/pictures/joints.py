@@ -191,6 +191,7 @@ def step_evidence(colours: NDArray[np.float32]) -> Field:
             total += np.square(step, out=step)
             total_long += np.square(long, out=long)
         np.maximum(best, np.multiply(total, total_long, out=total), out=best)
+    del line, step, long, total, total_long
     share = np.clip((best ** np.float32(0.25) - _NO_STEP) / (_STEP - _NO_STEP), 0.0, 1.0)
     evidence: Field = (_SUREST_STEP * share).astype(np.float32)
     return evidence

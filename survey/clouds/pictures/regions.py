@@ -29,7 +29,8 @@ class Borders:
     ----------
     pairs : (n, 2) numbers of the regions, the smaller first
     lengths : (n,) pixels along each
-    sums : (n, k + 1) sums of what is measured along each, and the number of its pixels that part columns
+    sums : (n, k + 3) sums of what is measured along each, of rows and columns, and the number of its pixels that part
+        columns
     steps : (n, 1 + c) number of its pixels beyond which both regions go on, and the sums of the steps of the colours
         there, from the first to the second
     """
@@ -114,13 +115,13 @@ def borders_of(
     seen = np.where(hidden, 0, regions)
     pairs, values, colours = [], [], []
     for axis in (1, 0):
-        count = regions.shape[axis]
-        a, b = (np.take(regions, np.arange(k, count - 1 + k), axis=axis) for k in (0, 1))
+        a, b = (regions[:, :-1], regions[:, 1:]) if axis else (regions[:-1], regions[1:])
         at = np.nonzero((a != b) & (a > 0) & (b > 0))
         first, second = a[at], b[at]
         pairs.append(np.sort(np.column_stack([first, second]), axis=1))
         larger = np.maximum(_at(measures, at, axis, 0), _at(measures, at, axis, 1)).T
-        values.append(np.column_stack([larger, np.full(len(first), float(axis))]))
+        rows, columns = at[0] + (1 - axis), at[1] + axis
+        values.append(np.column_stack([larger, rows, columns, np.full(len(first), float(axis))]))
         before, behind = -_REACH, 1 + _REACH
         inside = (_at(seen, at, axis, before) == first) & (_at(seen, at, axis, behind) == second)
         turned = np.where(first < second, inside, -1.0 * inside)
