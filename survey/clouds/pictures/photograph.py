@@ -69,7 +69,7 @@ def open_photograph(
         if a file cannot be read, or the scale is stated twice or contradicts itself
     """
     picture, tags = _opened(path)
-    pixels = np.asarray(picture.convert("RGB"))
+    pixels = _colours(picture)
     height, width = pixels.shape[:2]
     places, stated = _places(path, tags, (width, height), pixel, size)
     left_out = None
@@ -87,6 +87,15 @@ def open_photograph(
         lowest = _lowest(depth.parent / _INDEX)
         depths = filled(np.where(numbers > 0, lowest + (numbers - 1.0) * STEP, np.nan).astype(np.float32))
     return Photograph(path, pixels, depths, left_out, places, stated)
+
+
+def _colours(picture: Any) -> NDArray[np.uint8]:
+    """Return the colours (h, w, 3) of a picture, row by row: its bytes as a whole would be there three times."""
+    width, height = picture.size
+    out = np.empty((height, width, 3), dtype=np.uint8)
+    for row in range(height):
+        out[row] = np.asarray(picture.crop((0, row, width, row + 1)).convert("RGB"))[0]
+    return out
 
 
 def _opened(path: Path) -> tuple[Any, dict[int, tuple[float, ...]]]:

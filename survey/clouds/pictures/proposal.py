@@ -43,9 +43,6 @@ __all__ = [
 _REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
 _HIDDEN = 0.6  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
-_COURSED = (
-    0.5  # part of the strong joints that are of one direction or square to it, from which there are courses
-)
 _CHROMA = slice(1, 3)  # channels of a* and b*: those of lightness step at every edge of a shade
 _OPEN = 6.0  # size of an opening over the width of a joint
 
@@ -309,13 +306,13 @@ def _tile(
 
 
 def _kind_of(strength: Strength) -> str:
-    """Return whether joints are of one direction and square to it, as in courses, or of all, as in rubble."""
+    """Return whether most joints are of one direction or square to it, as in courses, or of all, as in rubble."""
     strong = strength.evidence > 0.6
     if not strong.any():
         return "coursed"
     quarter = np.round(strength.angle[strong] / DIRECTION).astype(int) % round(0.5 * np.pi / DIRECTION)
     share = np.bincount(quarter, strength.evidence[strong])
-    return "coursed" if float(share.max() / share.sum()) > _COURSED else "rubble"
+    return "coursed" if 2.0 * share.max() > share.sum() else "rubble"
 
 
 def _stones_of(regions: Ints, fields: Fields, kind: str) -> list[_Found]:

@@ -15,9 +15,6 @@ __all__ = ["Borders", "borders_of", "closed_regions", "over_texture"]
 _WEAK = 0.3  # strength over that of a joint below which there is stone
 _APART = 2.0 * WIDTH  # distance between the middles of two regions [px]
 _TOWARDS = 0.02  # by which the place farthest from all joints is lower, over the strength of a joint
-_LEVELS = (
-    5000.0  # levels of a flood in the strength of a joint, so that there are a hundred where there is none
-)
 _REACH = round(WIDTH)  # distance from the middle of a joint at which the colour is that of the stone [px]
 
 
@@ -93,7 +90,8 @@ def closed_regions(evidence: Field, void: Bools) -> Ints:
     peaks = (far == maximum_filter(far, size=2 * round(_APART) + 1)) & (far > 1.0) & ~void
     seeds, _ = label(peaks, structure=np.ones((3, 3)))
     height = np.minimum(evidence, STRONGEST) - _TOWARDS * far / max(float(far.max()), 1.0)
-    levels = np.round((height + _TOWARDS) * _LEVELS).astype(np.int16)
+    finest = np.iinfo(np.int16).max / (STRONGEST + _TOWARDS)
+    levels = np.round((height + _TOWARDS) * finest).astype(np.int16)
     levels[void] = -1
     levels, flooded = np.pad(levels, 1, constant_values=-1), np.pad(seeds.astype(np.int32), 1)
     flood(levels, int(levels.max()), flooded)

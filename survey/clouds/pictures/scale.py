@@ -13,10 +13,6 @@ __all__ = ["joint_width", "resized", "resized_field"]
 _WIDTHS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)  # widths of joints that are tried [px]
 _SAMPLE = 512  # side of the parts of a picture that they are tried on, at most [px]
 _ENOUGH = 128.0  # side over the width of a joint from which a part is no larger: some courses of some stones
-_AGREE = (
-    2  # of five parts that show joints of a width: others may show a door, one may show a bush or a scaffold
-)
-_GOOD = 0.5  # of the best contrast over grain, from which a finer resolution is preferred: it has the better edges
 
 
 def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[float, float]:
@@ -41,11 +37,13 @@ def joint_width(pixels: NDArray[np.uint8], depth: Field | None = None) -> tuple[
             channels, _, _ = channels_of(resized(pixels[part], width / WIDTH), heights)
             grain, contrast = grain_and_contrast(combined(channels))
             ratios.append(contrast / grain)
-        widths.append((width, sorted(ratios)[-min(_AGREE, len(ratios))]))
+        # the second best, where there are two: others may show a door, one may show a bush or a scaffold
+        widths.append((width, sorted(ratios)[-2:][0]))
     if not widths:
         return WIDTH, 0.0
     best = max(ratio for _, ratio in widths)
-    good = [width for width, ratio in widths if ratio >= min(_GOOD * best, best)]
+    # of those that have half of the best contrast the finest, which has the better edges
+    good = [width for width, ratio in widths if ratio >= min(0.5 * best, best)]
     # pixels between those of a picture show nothing more
     return next((width for width in good if width >= WIDTH), good[0]), best
 

@@ -139,3 +139,16 @@ def test_tiles_give_the_same_stones_as_the_whole():
     tiles = propose_outlines(picture, OutlineSettings(tile=420, overlap=120))
     assert len(tiles.stones) == len(whole.stones) == len(boxes)
     assert found_overlaps(tiles, boxes, shape).min() > 0.8
+
+
+@pytest.mark.parametrize("mode", ["RGB", "L", "P", "RGBA"])
+def test_colours_are_read_whole_whatever_the_height(mode, tmp_path):
+    from PIL import Image
+
+    from survey.clouds.pictures.photograph import open_photograph
+
+    pixels = np.random.default_rng(1).integers(0, 256, (700, 30, 3)).astype(np.uint8)
+    picture = Image.fromarray(pixels).convert(mode)
+    picture.save(tmp_path / "wall.png")
+    found = open_photograph(tmp_path / "wall.png", pixel=0.002).pixels
+    assert (found == np.asarray(picture.convert("RGB"))).all()
