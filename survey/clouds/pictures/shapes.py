@@ -129,7 +129,7 @@ def _straight_behind(dense: Array, veil: Bools) -> Array:
 
 
 def _between(before: Array, hidden: Array, after: Array, veil: Bools) -> Array:
-    """Return what is between two seen parts of a boundary: nothing if they are one side, else their corner."""
+    """Return what is between two seen parts of a boundary: nothing if they are one side, else their corners."""
     span = round(_SIDE * WIDTH)
     if min(len(before), len(after)) < span:
         return hidden
@@ -139,6 +139,8 @@ def _between(before: Array, hidden: Array, after: Array, veil: Bools) -> Array:
     turn = float(a[0] * b[1] - a[1] * b[0])
     off = q - p
     if abs(turn) < _SQUARE:
+        if float(a @ b) < 0.0:  # both ends of a side that is hidden
+            return np.stack([p + ((hidden - p) @ a).max() * a, q + ((hidden - q) @ b).min() * b])
         one_side = abs(float(a[0] * off[1] - a[1] * off[0])) < _STRAIGHT + abs(turn) * float(np.hypot(*off))
         return hidden[:0] if one_side else hidden
     corner = p + float(off[0] * b[1] - off[1] * b[0]) / turn * a
@@ -148,9 +150,10 @@ def _between(before: Array, hidden: Array, after: Array, veil: Bools) -> Array:
 
 
 def _line(points: Array) -> tuple[Array, Array, float]:
-    """Fit a line: a point of it, its unit direction, and the largest distance of the points from it."""
+    """Fit a line: a point of it, its unit direction from first to last, and the largest distance of the points."""
     middle = points.mean(axis=0)
     direction = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    direction *= np.sign(direction @ (points[-1] - points[0]))
     apart = (points - middle) @ np.array([-direction[1], direction[0]])
     return middle, direction, float(np.abs(apart).max())
 

@@ -109,3 +109,16 @@ def test_sides_meet_behind_a_veil():
     true = np.array([(10, 10), (109, 10), (109, 69), (10, 69)])
     for corner in true:
         assert np.hypot(*(shape.ring - corner).T).min() < 2.0
+
+
+def test_a_side_that_is_hidden_is_straight_from_one_bed_to_the_other():
+    rng = np.random.default_rng(2)
+    regions = np.zeros((80, 120), np.int64)
+    regions[10:70, 10:110] = 1
+    veil = np.zeros(regions.shape, bool)
+    veil[:, 100:] = True
+    regions[veil & (rng.random(regions.shape) < 0.3)] = 0
+    (shape,) = outline_shapes(regions, regions > 0, veil)
+    assert len(shape.ring) == 4
+    for corner in ((10, 10), (109, 10), (109, 69), (10, 69)):
+        assert np.hypot(*(shape.ring - corner).T).min() < 4.0  # a joint is three pixels wide
