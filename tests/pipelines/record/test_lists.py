@@ -147,7 +147,8 @@ def test_what_was_assumed_of_a_depth_stays_assumed_in_a_geopackage(url: str, tmp
     with open_database(url) as database, database.session() as session:
         session.execute(update(Entity).where(Entity.code == "S1").values(depth_origin="rule"))
     export_file(url, path)
-    said = {outline.code: outline.said for outline in read_vector(path, "elevation", {})}
+    outlines, _ = read_vector(path, "elevation", {})
+    said = {outline.code: outline.said for outline in outlines}
     with open_database(url) as database, database.session(read_only=True) as session:
         rows = find_rows(session, "entity", columns=["code", "depth", "depth_origin", "depth_source", "zone"])
     for row in rows:
