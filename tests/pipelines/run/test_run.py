@@ -35,6 +35,7 @@ size = 0.3
 step = 0.005
 """
 )
+THIN = "6 stones are thinner than the wall"
 
 
 def selected(text, session):
@@ -133,7 +134,7 @@ def test_a_run_writes_its_folder_and_keeps_its_results(own_url, tmp_path):
     (tmp_path / "low.toml").write_text(LOW, encoding="utf-8")
     heard = []
     done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out", heard.append)
-    assert {report.stage for report in heard} == {"blocks", "mesh", "check", "step", "write"}
+    assert {report.stage for report in heard} == {"blocks", "mesh", "check", "step", "confirm", "write"}
     summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
     assert summary == done.summary
     assert summary["outcome"] == "equilibrium"
@@ -221,7 +222,8 @@ def test_a_picture_that_shows_nothing_is_a_warning(own_url, tmp_path):
     text = LOW.replace('deformable = ["W02-02"]\n', "") + '[output]\npictures = ["error", "resultants"]\n'
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")
     done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
-    idle, omitted = done.warnings
+    idle, thin, omitted = done.warnings
+    assert THIN in thin
     assert "[mesh] has no effect: no stone deforms" in idle
     assert omitted == "no picture error: no stone deforms"
     assert [name for name in done.summary["files"] if name.endswith(".png")] == ["resultants.png"]
@@ -236,7 +238,7 @@ def test_without_pictures_the_rest_is_written_and_a_warning_says_what_to_install
     monkeypatch.setattr(run_module, "draw_pictures", no_pictures)
     (tmp_path / "low.toml").write_text(LOW.replace('deformable = ["W02-02"]\n', ""), encoding="utf-8")
     done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
-    assert done.warnings[1:] == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
+    assert done.warnings[2:] == ("no pictures: libGL.so.1: not there; apt-get install libgl1",)
     assert "apt-get install libgl1" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert (tmp_path / "out/results.vtkhdf").exists()
 
@@ -268,7 +270,8 @@ def test_a_static_start_is_told_and_a_warning_where_there_is_none(own_url, tmp_p
     (tmp_path / "low.toml").write_text(text, encoding="utf-8")
     done = run_scene(tmp_path / "low.toml", own_url, tmp_path / "out")
     assert done.summary["static"]["found"]
-    assert done.warnings == ()
+    (thin,) = done.warnings
+    assert THIN in thin
     assert "Began in static equilibrium" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     # without the course that holds them up, the stones fall
     falling = (
