@@ -172,7 +172,7 @@ def test_wrong_data_leave_nothing_behind(tmp_path):
     assert "neither or both" in fails(2, "orient")
     assert "--control with a project file" in fails(2, "orient", path, "--control", path)
     assert "--fixed-control or --check without --control" in fails(
-        2, "orient", "--photomodeler", _export(tmp_path), "--fixed-control"
+        2, "orient", "--photomodeler", _export(tmp_path), "--check", "1"
     )
 
 
