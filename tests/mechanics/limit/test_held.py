@@ -38,6 +38,13 @@ def test_a_block_slides_or_tips(stone, friction, value):
     within(limit_of(assembly(scene(ground(), stone, friction=friction))), value)
 
 
+@pytest.mark.parametrize("load", [0.7, 1.0, 3.0])
+def test_a_step_that_slides_tells_at_which_load_it_would_stop(load):
+    trial = held._Steps(assembly(scene(ground(), SQUAT, friction=0.6)), ALONG)(load)
+    assert not trial.holds
+    assert trial.stops == pytest.approx(0.6, rel=1e-4)
+
+
 def test_mortar_and_point_forces_count():
     """λ W = μ W + c A; a force twice as high up tips a block by half as much."""
     law = MortarJoint(0.5, tension=5e3, shear=4e3)
