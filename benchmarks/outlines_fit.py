@@ -10,7 +10,7 @@ from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import Bond, bond_of, join_weak, renumbered
 from survey.clouds.pictures.joints import WIDTH
 from survey.clouds.pictures.photograph import Photograph
-from survey.clouds.pictures.proposal import Fields, measured_fields
+from survey.clouds.pictures.proposal import Fields, joined_regions, measured_fields
 from survey.clouds.pictures.regions import closed_regions
 from survey.clouds.pictures.scale import joint_width
 from survey.clouds.pictures.splitting import line_features, lines_across, propose_missing
@@ -52,11 +52,7 @@ def fitted(draws: int) -> Iterator[tuple[str, Array]]:
 
 def _stayed(fields: Fields, true: Ints, kind: str, weights: Array, missing: Array | None) -> Samples:
     """Return the borders that stay in the end: what their features amount to, and whether they are between stones."""
-    regions = closed_regions(fields.parting, fields.void)
-    bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
-    bond.weights = weights
-    join_weak(bond)
-    regions = renumbered(regions, bond)
+    regions = joined_regions(fields, kind, weights)
     if missing is not None:
         regions = propose_missing(regions, fields.strength, fields.hidden, weights=missing)
     bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)

@@ -157,13 +157,8 @@ def fallen(on: RigidAssembly, question: Question, standing: Standing) -> Answer:
     match question:
         case LoadQuestion():
             facts |= {"meaning": str(question.live), "candidate": None, "candidate_lowest": None}
-            facts |= {
-                "bound": None,
-                "candidate_converged": None,
-                "limit": 0.0,
-                "limit_lost": 0.0,
-                "limit_sure": 0.0,
-            }
+            facts |= {"bound": None, "candidate_converged": None}
+            facts |= dict.fromkeys(("limit", "limit_lost", "limit_sure"), 0.0)
         case ThrustQuestion():
             kind = "settlement" if question.settles else "thrust"
             facts |= {

@@ -6,7 +6,7 @@ import unicodedata
 from ground.errors import SurveyError
 from ground.tables.numbers import shown
 
-__all__ = ["CODE", "KIND", "NO_COURSE", "code_of", "parse_course"]
+__all__ = ["CODE", "KIND", "NO_COURSE", "NUMBERED_ANEW", "code_of", "parse_course"]
 
 CODE = re.compile(r"[^\W_][\w.+/:-]{0,63}")
 """Pattern of the name of a stone."""
@@ -19,6 +19,9 @@ KIND = re.compile(r"[a-z][a-z0-9_-]{0,31}")
 
 NO_COURSE = frozenset(("arch", "vault", "bogen", "gewölbe", "arc", "voûte", "arco", "volta", "bóveda"))
 """Words that stand for the course of stones of an arch or vault, which have none."""
+
+NUMBERED_ANEW = "most numbers of stones stand in several courses: they are numbered anew in each"
+"""What is wrong where the number of a stone does not name it."""
 
 
 def parse_course(text: str, where: str) -> int:

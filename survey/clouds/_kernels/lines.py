@@ -24,9 +24,8 @@ def line_means(image, down, right, out):
             out[y, :start] += image[row, 0]
             out[y, stop:] += image[row, width - 1]
             total, more = out[y, start:stop], image[row, start + shift : stop + shift]
-            for x in range(
-                len(total)
-            ):  # slices, since an index that may be negative keeps loops from being vectorized
+            # slices, since an index that may be negative keeps loops from being vectorized
+            for x in range(len(total)):
                 total[x] += more[x]
         out[y] *= part
 

@@ -11,13 +11,7 @@ from ground.tables import table as tables
 from ground.tables.columns import COORDINATES, length_scale, places_of, unit_of
 from ground.tables.numbers import is_number
 from survey.arrays import Array
-from survey.clouds.outlines.outline import (
-    Outline,
-    attributes_of,
-    columns_of,
-    joined_code,
-    made_code,
-)
+from survey.clouds.outlines.outline import Outline, attributes_of, columns_of, joined_code, made_code
 
 __all__ = ["is_plain", "read_plain_json", "read_table"]
 

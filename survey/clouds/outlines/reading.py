@@ -15,9 +15,9 @@ from survey.clouds.outlines.labels import outlines_of, read_labels
 from survey.clouds.outlines.outline import Outline, WrongOutline, joined_names
 from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
 from survey.clouds.outlines.tracing import few_corners
-from survey.clouds.outlines.vector import is_wkt_table, read_vector, read_wkt_table
+from survey.clouds.outlines.vector import read_vector, read_wkt_table, wkt_table
 from survey.clouds.world import PixelPlace
-from survey.formats.fields import KIND
+from survey.formats.fields import KIND, NUMBERED_ANEW
 from survey.formats.tables.kinds import kind_of
 
 __all__ = ["PICTURES", "Drawing", "read_outlines"]
@@ -150,15 +150,15 @@ def _read(
         return _placed(path, *read_annotations(path, content, smooth, chosen, layer))
     if ending == ".json" and is_plain(content):
         return _scaled(Drawing(path, read_plain_json(path, content, chosen)), unit)
-    as_text = ending in _TABLES and is_wkt_table(path, layer)
-    if ending in _TABLES and not as_text:
+    as_text = wkt_table(path, layer) if ending in _TABLES else None
+    if ending in _TABLES and as_text is None:
         outlines, names = read_table(path, chosen, unit, layer)
         return Drawing(path, outlines, names=names)
-    if as_text or ending in _VECTORS:
+    if as_text is not None or ending in _VECTORS:
         features, names = (
-            read_wkt_table(path, chosen, layer, unit is not None)
-            if as_text
-            else read_vector(path, layer, chosen, unit is not None)
+            read_vector(path, layer, chosen, unit is not None)
+            if as_text is None
+            else read_wkt_table(path, as_text, chosen, unit is not None)
         )
         sound = tuple(feature for feature in features if isinstance(feature, Outline))
         wrong = tuple(feature for feature in features if isinstance(feature, WrongOutline))
@@ -193,7 +193,7 @@ def _check_numbers(drawing: Drawing, chosen: Mapping[str, str], kinds: Mapping[s
     words = dict.fromkeys(outline.said.kind for outline in drawing.outlines if outline.said.kind is not None)
     unknown = ",".join(f"{word}=ashlar" for word in words if KIND.fullmatch(kind_of(word, kinds)) is None)
     raise SurveyError(
-        "most numbers of stones stand in several courses: they are numbered anew in each",
+        NUMBERED_ANEW,
         where=str(drawing.path),
         remedy=f'name stones by both: --fields "code={both}{others}"'
         + (f', and say what kinds stand for: --kinds "{unknown}"' if unknown else ""),

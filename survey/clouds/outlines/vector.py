@@ -8,19 +8,13 @@ from typing import Any
 import numpy as np
 
 from ground.errors import SurveyError, UsageError
-from ground.tables import table as tables
+from ground.tables.table import Table, read_table
 from survey.arrays import Array
 from survey.clouds.extras import optional
-from survey.clouds.outlines.outline import (
-    Attributes,
-    Outline,
-    WrongOutline,
-    attributes_of,
-    made_code,
-)
+from survey.clouds.outlines.outline import Attributes, Outline, WrongOutline, attributes_of, made_code
 from survey.formats.tables.wkt import is_wkt
 
-__all__ = ["is_wkt_table", "read_vector", "read_wkt_table"]
+__all__ = ["read_vector", "read_wkt_table", "wkt_table"]
 
 _DEGREES = 1e-3  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
 _PIXELS = 30.0  # width of the usual outline from which it is of pixels: no stone is 30 m wide
@@ -77,21 +71,20 @@ def read_vector(
     return _features(path, shapes, fids, values, wheres, chosen, scaled), tuple(names)
 
 
-def is_wkt_table(path: Path, sheet: str | None) -> bool:
-    """Return whether a table has an outline as well-known text in a field of each row."""
+def wkt_table(path: Path, sheet: str | None) -> Table | None:
+    """Read a table that has an outline as well-known text in a field of each row; None if it has not."""
     try:
-        table = tables.read_table(path, _is_row, "", sheet)
+        table = read_table(path, _is_row, "", sheet)
     except SurveyError:
-        return False
-    return bool(table.names)
+        return None
+    return table if table.names else None
 
 
 def read_wkt_table(
-    path: Path, chosen: Mapping[str, str], sheet: str | None, scaled: bool = False
+    path: Path, table: Table, chosen: Mapping[str, str], scaled: bool = False
 ) -> tuple[tuple[Outline | WrongOutline, ...], tuple[str, ...]]:
     """Read the outlines of a table, one in each row, in any column; otherwise as `read_vector`."""
     shapely = optional("shapely", "outlines as well-known text")
-    table = tables.read_table(path, _is_row, "", sheet)
     at = next(k for k, cell in enumerate(table.rows[0].cells) if is_wkt(cell))
     names = tuple(name for k, name in enumerate(table.names) if k != at and name)
     values, texts, wheres = [], [], []

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools, Ints
 from survey.clouds._kernels.lines import contrasts, keep_strongest, line_means, side_steps
 
@@ -96,7 +97,7 @@ def combined(channels: list[Field]) -> Field:
         grain, contrast = grain_and_contrast(channel)
         total += np.float32(contrast / grain**2) * channel
     sparse = total[:: round(WIDTH)]
-    scale = 1.4826 * float(np.median(np.abs(sparse - np.median(sparse)))) + 1e-9
+    scale = CONSISTENT * float(np.median(np.abs(sparse - np.median(sparse)))) + 1e-9
     return (total / scale).astype(np.float32)
 
 
@@ -206,9 +207,8 @@ def _along(turn: float, places: Ints) -> tuple[Ints, Ints]:
     """Return rows and columns from a pixel to places along a line; a line that rises has fewer rows."""
     down, right = -np.sin(turn), np.cos(turn)
     larger = max(abs(down), abs(right))
-    return np.round(places * down / larger).astype(np.int64), np.round(places * right / larger).astype(
-        np.int64
-    )
+    rows, columns = (np.round(places * step / larger).astype(np.int64) for step in (down, right))
+    return rows, columns
 
 
 def _sides(turn: float, reaches: tuple[int, ...]) -> tuple[Ints, Ints]:

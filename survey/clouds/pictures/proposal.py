@@ -281,10 +281,12 @@ def measured_fields(photograph: Photograph, part: tuple[slice, slice], factor: f
     return Fields(image, strength, parting, hidden, void, colours)
 
 
-def joined_regions(fields: Fields, kind: str) -> Ints:
-    """Return the regions (h, w) of a part of a picture, those that are one stone joined."""
+def joined_regions(fields: Fields, kind: str, weights: Array | None = None) -> Ints:
+    """Return the regions (h, w) of a part of a picture, those that are one stone joined, by other weights if given."""
     regions = closed_regions(fields.parting, fields.void)
     bond = bond_of(regions, fields.strength, fields.colours, fields.hidden, kind)
+    if weights is not None:
+        bond.weights = weights
     join_weak(bond)
     return renumbered(regions, bond)
 

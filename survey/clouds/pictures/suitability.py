@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.clouds.pictures.channels import lightness
 
@@ -135,7 +136,7 @@ def _directions(rings: Sequence[Array], upright: bool) -> tuple[float, float]:
     for _ in range(10):  # least absolute deviations: sides of arches and repairs have other directions
         angles = np.linalg.lstsq(terms * scale[:, None], angle[use] * scale, rcond=None)[0]
         scale = np.sqrt(weight[use] / np.maximum(np.abs(angle[use] - terms @ angles), 0.2))
-    spread = 1.4826 * float(np.median(np.abs(angle[use] - terms @ angles)))
+    spread = deviation(angle[use] - terms @ angles, 0.0)
     share = weight[use] / weight[use].mean()
     error = spread * np.sqrt(np.diag(np.linalg.pinv((terms * share[:, None]).T @ terms)))
     change = np.where(np.abs(angles) > _CERTAIN * error, np.abs(angles), 0.0)

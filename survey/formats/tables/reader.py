@@ -22,7 +22,7 @@ from ground.tables.columns import plain
 from ground.tables.decimals import Decimals
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
-from survey.formats.fields import CODE, KIND, NO_COURSE, code_of, parse_course
+from survey.formats.fields import CODE, KIND, NO_COURSE, NUMBERED_ANEW, code_of, parse_course
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.tables.axes import (
     ORDERS,
@@ -261,7 +261,7 @@ def _check_numbers(
         return
     both = [names[columns.at[what]] if names else str(columns.at[what] + 1) for what in ("course", "block")]
     raise SurveyError(
-        "most numbers of stones stand in several courses: they are numbered anew in each",
+        NUMBERED_ANEW,
         where=path,
         remedy=f'name stones by both: --columns "block={"+".join(both)}"',
     )

@@ -380,11 +380,17 @@ def test_a_word_for_a_kind_in_a_label_is_the_kind(drawing, label):
     assert not any(one.doubts for one in found)
 
 
+def numbered(drawing, place, text):
+    """Insert a label: a number in a circle."""
+    if "NUMBER" not in drawing.blocks:
+        block = drawing.blocks.new("NUMBER")
+        block.add_circle((0, 0), 0.05)
+        block.add_attdef("NR", (0, 0), dxfattribs={"height": 0.02})
+    drawing.modelspace().add_blockref("NUMBER", place).add_auto_attribs({"NR": text})
+
+
 @pytest.mark.parametrize("label", ["leader", "text", "multileader"])
 def test_a_label_beside_its_stone_is_of_the_stone_that_its_leader_points_to(drawing, label):
-    block = drawing.blocks.new("NUMBER")
-    block.add_circle((0, 0), 0.05)
-    block.add_attdef("NR", (0, 0), dxfattribs={"height": 0.02})
     space = drawing.modelspace()
     for k in range(5):
         square(space, 0.6 * k)
@@ -402,7 +408,7 @@ def test_a_label_beside_its_stone_is_of_the_stone_that_its_leader_points_to(draw
         if label == "text":
             space.add_text(f"N{k}", height=0.02).set_placement(place)
         else:
-            space.add_blockref("NUMBER", place).add_auto_attribs({"NR": f"N{k}"})
+            numbered(drawing, place, f"N{k}")
     found = drawing.read()
     assert [one.code for one in found.outlines] == [f"N{k}" for k in range(5)]
     assert areas(found) == pytest.approx([0.15] * 5)
@@ -412,13 +418,10 @@ def test_a_label_beside_its_stone_is_of_the_stone_that_its_leader_points_to(draw
 
 
 def test_labels_that_stand_in_no_outline_are_listed(drawing):
-    block = drawing.blocks.new("NUMBER")
-    block.add_circle((0, 0), 0.05)
-    block.add_attdef("NR", (0, 0), dxfattribs={"height": 0.02})
     space = drawing.modelspace()
     for k in range(5):
         square(space, 0.6 * k)
-        space.add_blockref("NUMBER", (0.6 * k + 0.2, 0.1 if k < 4 else 2.0)).add_auto_attribs({"NR": f"N{k}"})
+        numbered(drawing, (0.6 * k + 0.2, 0.1 if k < 4 else 2.0), f"N{k}")
     found = drawing.read()
     assert [one.code for one in found.outlines] == ["N0", "N1", "N2", "N3", "S5"]
     assert ("texts", "1 labels stand in no outline: N4") in found.left
