@@ -16,5 +16,3 @@ Rooms, each on those above it::
 Nothing is imported here, so that programs that need only the plain values of ``store.stone_record`` and
 ``store.run_record`` do not load SQLAlchemy.
 """
-
-__all__: list[str] = []

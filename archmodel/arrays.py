@@ -6,8 +6,6 @@ therefore markers; type checkers see the arrays.
 
 from typing import TYPE_CHECKING
 
-__all__ = ["Array", "Bools", "Ints", "Texts", "Values"]
-
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray

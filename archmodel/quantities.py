@@ -7,8 +7,6 @@ computes a result of a structure stands under the same name in `pipelines.result
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-__all__ = ["QUANTITIES", "Quantity", "quantities_of", "units_of"]
-
 
 @dataclass(frozen=True)
 class Quantity:

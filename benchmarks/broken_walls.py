@@ -22,8 +22,6 @@ from pipelines.ingest.ingest import ingest
 from pipelines.ingest.outlined import mask_options
 from survey.formats.options import ReadingOptions
 
-__all__ = ["EXPERIMENTS", "Experiment", "Input", "Inputs", "Rubble", "granite", "granite_inputs"]
-
 MEASURED, ASSUMED = "measured", "assumed"
 
 

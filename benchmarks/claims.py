@@ -10,19 +10,6 @@ from scipy.stats import t
 
 from mechanics.arrays import Array
 
-__all__ = [
-    "CONSTANT",
-    "Claim",
-    "Finding",
-    "Run",
-    "Verdict",
-    "mean_of",
-    "parts_of",
-    "single",
-    "strayed",
-    "verdict_of",
-]
-
 CONSTANT = 0.2
 """Largest change of a curve that counts as constant, and of a ratio as equal [-]."""
 _LEVEL = 0.95  # of the intervals [-]

@@ -8,8 +8,6 @@ import numpy as np
 from benchmarks.claims import CONSTANT, Claim, Finding, Run, mean_of, parts_of, single
 from mechanics.arrays import Array
 
-__all__ = ["FAULT"]
-
 _SMALL, _LARGEST = (0.0, 1e3, 1e4), 1e5  # γ of the paper [N]
 _SEEN = 0.02  # change of λ that a curve of the paper shows [-]
 _FIRST = 0.25  # share of the run that is its first phase, 10 of 40 s [-]

@@ -7,8 +7,6 @@ import numpy as np
 
 from benchmarks.claims import CONSTANT, Claim, Finding, Run, mean_of, parts_of, single, strayed
 
-__all__ = ["FOLD"]
-
 _ALIKE = 0.9  # correlation of folds that are similar [-]
 _BAND = 2.0  # shear of a band over the median along its layer [-]
 _SLOW = "changes by less than 20 % from the first"

@@ -46,8 +46,6 @@ from mechanics.scene.shapes import BOX_FACES, box_corners
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 
-__all__ = ["KINDS", "Case", "fitted", "main", "measured"]
-
 _STONE = Material("stone", density=2400.0, young=5e9, poisson=0.2)
 _BRICK = (0.6, 0.4, 0.3)  # length, depth and height of a stone [m]
 # stones of the scene that compiles, or loads, every kernel

@@ -32,8 +32,6 @@ from synthetic.samples import recipe_of
 from synthetic.true_movement import true_movement
 from synthetic.write import write_sample
 
-__all__ = ["Laboratory", "drawn", "laboratory", "main", "outcome"]
-
 _SETTLED = "the left corner settled"
 _TRUE = {
     "core-sunk": "the core decayed and sank",

@@ -34,8 +34,6 @@ from pipelines.assess.pushover.findings import mechanism_of
 from pipelines.assess.pushover.measured import read_curve
 from pipelines.draw.loading import draw_curve, draw_pushed
 
-__all__ = ["main"]
-
 _DATA = ROOT.parent / "shared" / "data" / "experiments"
 _PLACES = (0.002, 0.005, 0.01, 0.02, 0.03)  # displacements at which forces are compared [m]
 

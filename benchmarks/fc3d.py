@@ -46,8 +46,6 @@ from mechanics.problem.residual import project_on_cone
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
 
-__all__ = ["main", "siconos_error"]
-
 # η begins at this, or at the tolerance times that, and goes down by this factor, to rounding at most
 _LOOSEST, _LOOSER, _TIGHTER, _SMALLEST = 1e-2, 1e5, 10.0, 1e-14
 # solves between an η that suffices and one that does not

@@ -19,8 +19,6 @@ from benchmarks.report import machine
 from ground.kernels.uses import COMMANDS, LISTS, OTHERS
 from tests.pipelines.scenes import small_geology
 
-__all__ = ["MATRIX", "SAMPLE", "main", "small_geology"]
-
 SAMPLE = Path("data/samples/window")
 
 _LINES = """

@@ -42,8 +42,6 @@ from pipelines.geology.file import read_geology
 from pipelines.geology.observe import WHOLE, Instants, read_rows
 from pipelines.geology.run import run_geology
 
-__all__ = ["main", "pushing", "read_run"]
-
 _SCENES = ROOT / "data" / "samples" / "geology"
 _PAGE = ROOT / "docs" / "geology.md"
 # γ of the paper [N]; with lengths times 0.3162, and so the weight of the cover, it is scaled with them

@@ -36,8 +36,6 @@ from pipelines.geology.file import read_geology
 from pipelines.geology.observe import Fields, Instants, read_rows
 from pipelines.geology.sample import PreparedSample, prepare
 
-__all__ = ["main", "rows_of"]
-
 _PAGE = ROOT / "docs" / "geology.md"
 _SHEARED = (0.05, 0.95)  # motion over the slip of disks that shear [-]
 _PART = 20.0  # lengths over which the fold's surface is averaged, over the mean radius, as its front [-]

@@ -33,8 +33,6 @@ from pipelines.geology.file import read_geology
 from pipelines.geology.observe import Instants
 from pipelines.geology.sample import prepare
 
-__all__ = ["main", "shear_by_height"]
-
 _PAGE = ROOT / "docs" / "geology.md"
 _NAME = "W2"
 _DRAGGED = 10.0  # height above the floor within which the lowest disks stay behind, in diameters [-]

@@ -39,8 +39,6 @@ from survey.simplify.simplify import simplify
 from synthetic.buildings.openings import ArchShape
 from synthetic.buildings.walls import wall
 
-__all__ = ["closed", "main", "measured", "write"]
-
 # what is done, with which file, of how many times N stones
 _STAGES = (
     ("read", "moma", 1),

@@ -21,10 +21,9 @@ from tempfile import TemporaryDirectory
 
 from packaging.requirements import Requirement
 
-from benchmarks.first_use import MATRIX, SAMPLE, small_geology
+from benchmarks.first_use import MATRIX, SAMPLE
 from benchmarks.report import machine
-
-__all__ = ["Use", "base_packages", "main", "tables"]
+from tests.pipelines.scenes import small_geology
 
 PAGE = Path("docs/design/first-use.md")
 _MEGABYTE = 1e6

@@ -14,9 +14,6 @@ from mechanics.problem.problem import ContactProblem
 from mechanics.problem.residual import natural_map
 from mechanics.stones.polyhedra import mass_properties
 
-__all__ = ["Judge", "Touch", "Trace", "Verdict", "read_trace"]
-
-
 _ARRAYS = ("cpu", "sweeps", "centre", "frame", "contacts", "solved", "compliant")
 
 

@@ -41,8 +41,6 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
 from mechanics.scene.shapes import bond, box, wall
 from mechanics.stones.materials import Material
 
-__all__ = ["FACADES", "FRICTION", "WALLS", "LimitCase", "facade", "facade_case", "main", "measured"]
-
 _PAGE = ROOT / "docs" / "accuracy.md"
 _RUNS = 8  # of the dynamics about a limit, at most
 _LOADS = columns(

@@ -47,8 +47,6 @@ from mechanics.model.model import build_model
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Scene
 
-__all__ = ["gravity_of", "main", "run_moma", "traced"]
-
 _STEP, _THETA = 1e-3, 0.5  # h [s] and θ of both programs
 _SETTLED = 20  # steps at the end that count as settled
 _SWEEPS = 20_000  # largest number of our iterations in a step

@@ -20,9 +20,6 @@ from mechanics.stones.meshing.meshers.mesher import mesh_block
 from mechanics.stones.meshing.quality import mesh_quality
 from mechanics.stones.polyhedra import mass_properties
 
-__all__ = ["main"]
-
-
 _LIMESTONE = Material("limestone", density=2000.0, young=1e10, poisson=0.2)
 # edge length over the cube root of the volume with which meshes have about 200 nodes
 _SIZES = {"box": 0.245, "voussoir": 0.235, "leaning": 0.245, "slender 1:20": 0.28, "flat 1:20": 0.41}

@@ -22,8 +22,6 @@ from survey.clouds.pictures.proposal import Proposal, propose_outlines
 from survey.clouds.world import PixelPlace
 from synthetic.buildings.rendered_walls import STYLES, RenderedWall, rasterised, render_wall
 
-__all__ = ["corner_errors", "main", "panoptic_quality", "picture_of"]
-
 _SHARED = ROOT.parent / "shared" / "data"
 _WEIGHTS = ROOT / "survey" / "clouds" / "pictures" / "weights.json"
 _PIXEL = 0.002  # of the masks of rubble, which are 1.0 × 1.2 m [m]

@@ -17,8 +17,6 @@ from survey.clouds.pictures.splitting import line_features, lines_across, propos
 from survey.clouds.world import PixelPlace
 from synthetic.buildings.rendered_walls import STYLES, rasterised, render_wall
 
-__all__ = ["fitted"]
-
 _ROUNDS = 2  # fits, each to the regions that the weights of the one before leave
 _RIDGE = 0.1  # penalty on the square of a weight, so that classes that a plane parts have finite weights
 _PURE = 0.7  # part of the stone of a region that is of one true stone, without which it says nothing

@@ -26,8 +26,6 @@ from pipelines.tuning.expected_errors import BOUNDS, TYPICAL, expected_errors, l
 from pipelines.tuning.overlay import Overlay, overlaid_scene
 from pipelines.tuning.profiles import PROFILES, Profile
 
-__all__ = ["CASES", "HELD_OUT", "REFERENCE", "Case", "Found", "main", "measured_rows", "ratios", "search"]
-
 _FINEST = replace(
     PROFILES["accurate"].rest, cells=3.0
 )  # a mesh half as fine again as that of the finest profile

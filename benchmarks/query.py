@@ -29,7 +29,7 @@ from archmodel.database.session import Database, open_database
 from archmodel.describe.runs import describe_run
 from archmodel.describe.trace import trace
 from archmodel.query.api import find
-from archmodel.relations.graph import load_path
+from archmodel.relations.load_paths import load_path
 from archmodel.store.find_by_code import Subjects
 from archmodel.store.run_record import Columns, ErrorMeasures, RunRecord, StoneResult
 from archmodel.store.runs import store_run
@@ -44,8 +44,6 @@ from moma.cli.text.query import Question as Query
 from moma.cli.text.query import answer
 from pipelines.ingest.relate import relate
 from tests.postgresql import Unavailable, running_server
-
-__all__ = ["COURSES", "QUESTIONS", "RUNS", "STEPS", "Question", "asked", "built", "main"]
 
 _BUILT = columns(
     "database database | what stored | seconds processor, s :.3g | memory_mb memory it took, MB :.3g"

@@ -29,8 +29,6 @@ from synthetic.buildings.openings import ArchShape
 from synthetic.buildings.vaults import semicircular_arch
 from synthetic.buildings.walls import wall
 
-__all__ = ["main"]
-
 _SAMPLE = ROOT / "data/samples/window/window.moma"
 _STONE = Material("limestone", density=2350.0, young=12e9, poisson=0.2)
 _RINGS = (0, 1, 2, 3)

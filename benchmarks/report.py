@@ -21,30 +21,6 @@ from scipy.sparse import issparse
 from ground.errors import MomaError, SolverError, UsageError
 from mechanics.dynamics.progress import Clock
 
-__all__ = [
-    "ROOT",
-    "ProcessorClock",
-    "Row",
-    "Table",
-    "alone",
-    "arrays_bytes",
-    "columns",
-    "commit",
-    "environment",
-    "guarded",
-    "machine",
-    "one_thread",
-    "options_of",
-    "peak_bytes",
-    "print_json",
-    "print_table",
-    "progress",
-    "show",
-    "spread",
-    "table_lines",
-    "write_between",
-]
-
 ROOT = Path(__file__).resolve().parents[1]
 """Root of the project."""
 

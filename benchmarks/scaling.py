@@ -54,8 +54,6 @@ from mechanics.simulate import simulate
 from mechanics.solvers.choice import choose_solver
 from mechanics.stones.meshing.elements import Element
 
-__all__ = ["main"]
-
 # bricks and courses, columns and rows: about 100, 300, 1,000, … contacts; and the wall of 1,600 bricks
 _SIZES = {
     "wall": ((4, 3), (6, 5), (10, 9), (20, 14), (40, 22), (50, 55), (80, 107), (40, 40)),

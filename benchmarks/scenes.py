@@ -32,22 +32,6 @@ from mechanics.scene.shapes import BOX_FACES, box, box_corners
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 
-__all__ = [
-    "BlockScene",
-    "column",
-    "disk_box",
-    "engine_scene",
-    "first_problem",
-    "list_scenes",
-    "problem_of",
-    "read_scene",
-    "rigid_scenes",
-    "running_bond",
-    "thick_wall",
-    "wall_scene",
-    "write_scene",
-]
-
 # length, height and depth of a brick [m]
 _BRICK = (0.30, 0.10, 0.15)
 _DENSITY = 2400.0  # where nothing else is said [kg/m³]

@@ -25,8 +25,6 @@ from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
 from synthetic.write import write_sample
 
-__all__ = ["CASES", "main", "rows"]
-
 _TABLE = columns(
     "words case, joints | order order | thrust_shown thrust [kN] :.2f | "
     "supports_shown on other supports, % :.1f | joints_differ_shown change of joints, % :.1f | "

@@ -18,8 +18,6 @@ from mechanics.problem._kernels import Laws, local_factors, solve_contact
 from mechanics.problem.forms import block_diagonal
 from mechanics.problem.problem import ContactProblem, GaussSeidel, ScaledDelassus, mean_diagonal
 
-__all__ = ["StoredDelassus", "StoredForm", "read_problem"]
-
 
 def read_problem(path: Path) -> ContactProblem:
     """Read `data` (nnz, 3, 3), `indices`, `indptr`, `q` (3 nc), `mu` (nc).

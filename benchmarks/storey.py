@@ -20,8 +20,6 @@ from pipelines.run.assemble import assemble
 from pipelines.scene.file import read_scene
 from synthetic.write import write_sample
 
-__all__ = ["main", "measured"]
-
 _SMALL = 5  # courses of a storey that compiles or loads the kernels
 _TABLE = columns(
     "courses courses :d | stones stones :d | bodies with core :d | contacts contacts :d | "

@@ -40,18 +40,6 @@ from mechanics.scene.shapes import box
 from mechanics.scene.state import State
 from mechanics.stones.materials import Material
 
-__all__ = [
-    "BASE",
-    "Tower",
-    "earthquake",
-    "expected_contacts",
-    "main",
-    "strongest",
-    "tower",
-    "tower_blocks",
-    "tower_scene",
-]
-
 BASE = "base"
 """Code of the ground on which the tower stands."""
 

@@ -26,27 +26,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Self
 
-__all__ = [
-    "DatabaseError",
-    "ExchangeError",
-    "GeometryError",
-    "MeshError",
-    "MissingLibraryError",
-    "MomaError",
-    "NoDatabaseError",
-    "QueryError",
-    "SceneError",
-    "SolverError",
-    "StorageError",
-    "SurveyError",
-    "UnsoundSceneError",
-    "UsageError",
-    "missing_library",
-    "storage_error",
-    "storing",
-]
-
-
 _HERE = ("archmodel", "ground", "mechanics", "moma", "pipelines", "survey")
 
 _PACKAGES = {

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["area_and_centroid"]
-
 Array = NDArray[np.float64]
 
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple, get_type_hints
 
-__all__ = ["Setting", "declared"]
-
 
 class Setting(NamedTuple):
     """Annotation of a field: ``friction: Annotated[float, Setting("Coulomb's coefficient μ.", "-", at_least=0)]``.

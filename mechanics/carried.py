@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol, TypeVar
 
-__all__ = ["Carried", "Carrier", "Checkpointing", "Rows"]
-
 T = TypeVar("T")
 
 Carried = Mapping[str, Any]

@@ -29,8 +29,6 @@ from mechanics.scene.scene import Fidelity, Method, Scene, Start
 from mechanics.scene.stages import Stage, check_stages, whole_scene
 from mechanics.scene.state import State
 
-__all__ = ["Archive", "simulate", "simulate_stages"]
-
 _CLAMPED = (
     "its stones came to rest, but ones that do not deform would fall in their place: what holds them is "
     "self-stress, which no load applies"

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from archmodel.describe.history import history
     from archmodel.describe.trace import trace
     from archmodel.query.api import find, find_rows
-    from archmodel.relations.graph import load_path
+    from archmodel.relations.load_paths import load_path
     from mechanics.results.result import Result
     from mechanics.scene.scene import Block, Fidelity, Scene
     from mechanics.scene.stages import Stage
@@ -50,7 +50,8 @@ if TYPE_CHECKING:
     from pipelines.run.run import run_scene
     from pipelines.scene.file import read_scene
     from survey.clouds.settings import CloudOptions, MaskOptions
-    from survey.formats.reading import ReadingOptions, open_survey
+    from survey.formats.options import ReadingOptions
+    from survey.formats.reading import open_survey
     from survey.registration.stones import survey_stones
 
 __all__ = [
@@ -91,7 +92,7 @@ _HOMES = {
     "Fidelity": "mechanics.scene.scene",
     "MaskOptions": "survey.clouds.settings",
     "Material": "mechanics.stones.materials",
-    "ReadingOptions": "survey.formats.reading",
+    "ReadingOptions": "survey.formats.options",
     "Result": "mechanics.results.result",
     "Scene": "mechanics.scene.scene",
     "Stage": "mechanics.scene.stages",
@@ -101,7 +102,7 @@ _HOMES = {
     "find_rows": "archmodel.query.api",
     "history": "archmodel.describe.history",
     "ingest": "pipelines.ingest.ingest",
-    "load_path": "archmodel.relations.graph",
+    "load_path": "archmodel.relations.load_paths",
     "moma_solve": "pipelines.record.export.compas_solve",
     "open_database": "archmodel.database.session",
     "open_survey": "survey.formats.reading",

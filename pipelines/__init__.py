@@ -1,3 +1,1 @@
 """The beam: each step from a survey file to a report; the only code that knows all three pillars."""
-
-__all__: list[str] = []

@@ -15,22 +15,6 @@ import numpy as np
 from ground.errors import GeometryError
 from survey.arrays import Array
 
-__all__ = [
-    "CLEARANCES",
-    "WIDTHS",
-    "Bed",
-    "Piece",
-    "PlanLine",
-    "PlannedStone",
-    "crossing",
-    "fill",
-    "fill_run",
-    "level",
-    "planned",
-    "upright",
-]
-
-
 WIDTHS = {"header": (0.31, 0.46), "stretcher": (0.48, 0.80)}  # least and largest width of each kind [m]
 CLEARANCES = (0.09, 0.06, 0.03)  # preferred, then allowed, between head joints of neighbouring courses [m]
 _REST = 2.4  # length of the end of a run, which is filled as a whole so that it ends at the stop [m]

@@ -26,9 +26,6 @@ from synthetic.measure import (
 )
 from synthetic.true_joints import TrueJoint, true_joints
 
-__all__ = ["Draft", "SolidDraft", "SyntheticBuilding", "flat_stone", "measured_building", "observer"]
-
-
 SOURCE = "synthetic value, chosen for this building"
 SEEN = "synthetic value, as if measured on a side that can be seen"
 _NONE: Movement = MappingProxyType({})

@@ -13,20 +13,6 @@ from synthetic.buildings.tower import tower_storey
 from synthetic.buildings.walls import wall
 from synthetic.frame import Movement, wall_frame
 
-__all__ = [
-    "CORE_SUNK",
-    "PULSE",
-    "PUSHED",
-    "SETTLED",
-    "SETTLED_PHASES",
-    "SETTLED_SMALL",
-    "SHAKEN",
-    "Cause",
-    "MovedBuilding",
-    "tower_settled",
-]
-
-
 _REACH = 2.5  # distance from the corner of the tower at which its settlement ends [m]
 _HEADS = 0.75  # share of the courses of the tower below the heads of its walls
 PULSE = (0.05, 0.25)

@@ -12,9 +12,6 @@ from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from synthetic.bond import PlannedStone
 
-__all__ = ["BATTER", "Movement", "RigidMotion", "TrueStone", "WallFrame", "build_stone", "wall_frame"]
-
-
 ORIGIN = (12.4, 38.25, 6.83)  # foot of the window's axis in the local site frame [m]
 AZIMUTH = math.radians(7.0)  # of the wall against the x axis
 BATTER = math.radians(0.3)

@@ -9,8 +9,6 @@ import numpy as np
 
 from mechanics.scene.shapes import bond
 
-__all__ = ["GRANITE_SCENE", "GRANITE_WALL", "MEASURED", "units", "units_text"]
-
 GRANITE_WALL = "granite-wall"
 """Name of the sample."""
 

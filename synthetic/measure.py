@@ -14,18 +14,6 @@ from survey.records.survey import BlockRecord
 from synthetic.bond import PlanLine, crossing
 from synthetic.frame import TrueStone, WallFrame
 
-__all__ = [
-    "HALF_JOINT",
-    "SIGMA",
-    "MeasuredStone",
-    "add_blunders",
-    "inset",
-    "margin_points",
-    "measure_stone",
-    "modelled_solid",
-]
-
-
 # of one coordinate [m]: 3 mm in space (√3 · 1.73 mm), the mean error of a photogrammetric point
 SIGMA = 0.00173
 HALF_JOINT = (0.004, 0.0075)  # distance of each stone from the true joint: joints are 8 to 15 mm open [m]

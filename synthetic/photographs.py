@@ -23,15 +23,6 @@ from survey.orientation.rotations import from_angles
 from synthetic.buildings.window import WindowBay, make_window
 from synthetic.measure import inset, margin_points
 
-__all__ = [
-    "PHOTOGRAPHED",
-    "PICTURES",
-    "TrueCamera",
-    "render_photographs",
-    "true_cameras",
-    "write_photographs",
-]
-
 PHOTOGRAPHED = ("photographs.toml", "marks.txt", "control.txt", "marked.moma")
 """Names of the files that are written."""
 

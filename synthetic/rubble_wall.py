@@ -14,17 +14,6 @@ from scipy.spatial import Voronoi
 
 from survey.arrays import Array
 
-__all__ = [
-    "DEPTH",
-    "RUBBLE_SCENE",
-    "RUBBLE_WALL",
-    "SIZE",
-    "RubbleWall",
-    "make_rubble_wall",
-    "mask_png",
-    "rubble_truth",
-]
-
 RUBBLE_SCENE = """\
 # Rubble wall: synthetic, no such wall exists. Every key is explained in docs/scene.md.
 {commands}

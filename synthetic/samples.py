@@ -36,8 +36,6 @@ from synthetic.rubble_wall import RUBBLE_WALL
 from synthetic.scan import Scan, scan_window
 from synthetic.true_movement import true_movement
 
-__all__ = ["SAMPLES", "Recipe", "Sample", "recipe_of"]
-
 _COURSES = 40  # of the tower
 _SMALL = 12  # courses of the small one
 _MIN_COURSES = 2  # courses that a tower may have

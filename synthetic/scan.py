@@ -17,8 +17,6 @@ from synthetic.buildings.window import WindowBay
 from synthetic.frame import TrueStone, WallFrame
 from synthetic.measure import MeasuredStone, inset
 
-__all__ = ["JITTER", "Scan", "outlines_text", "scan_window", "visible_corners", "write_masks", "write_scan"]
-
 JITTER = 0.005
 """Standard deviation of a drawn corner, across and up [m]."""
 

@@ -12,8 +12,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 
-__all__ = ["TrueJoint", "true_joints"]
-
 Point = tuple[float, float]
 
 _COPLANAR = 1e-9  # distance of two faces in one plane, due to rounding [m]

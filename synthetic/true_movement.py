@@ -20,8 +20,6 @@ from survey.unseen.core.propose import propose_infill
 from synthetic.causes import PULSE, Cause, MovedBuilding
 from synthetic.frame import Movement, RigidMotion
 
-__all__ = ["true_movement"]
-
 _LONGEST = 3.0  # duration of the simulation [s]
 
 

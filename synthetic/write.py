@@ -28,8 +28,6 @@ from synthetic.rubble_wall import (
 from synthetic.samples import Recipe, recipe_of
 from synthetic.scan import Scan, outlines_text, write_masks, write_scan
 
-__all__ = ["write_sample"]
-
 _SCENE = """\
 # {title}: synthetic, no such building exists. Every key is explained in docs/scene.md.
 {commands}

@@ -18,8 +18,6 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["COLLECTED", "DEAR", "GUARDS", "KEPT", "RISKS", "cheapest", "dear", "entries", "guards", "is_dear"]
-
 DEAR = Path(__file__).with_name("dear.txt")
 """List of dear tests: their file, then, indented, their names, with `+` those that run in `.ci/run` nevertheless."""
 

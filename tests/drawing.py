@@ -13,8 +13,6 @@ import pytest
 from pipelines.draw import pictures
 from pipelines.draw.offscreen.jobs import save_job
 
-__all__ = ["allow"]
-
 BLANK = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR42mP4DwABAQEAG7buVgAAAABJRU5ErkJggg=="
 )

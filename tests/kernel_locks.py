@@ -4,8 +4,6 @@ import os
 import tempfile
 from pathlib import Path
 
-__all__ = ["compile_once"]
-
 
 def compile_once() -> None:
     """Make the workers of one test run compile every kernel once between them.

@@ -2,7 +2,5 @@
 
 from pathlib import Path
 
-__all__ = ["ROOT", "SAMPLE"]
-
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLE = ROOT / "data/samples/window"

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from psycopg import Connection
     from psycopg.rows import TupleRow
 
-__all__ = ["Server", "Unavailable", "running_server"]
-
 OPTIONS = {
     "listen_addresses": "",
     "fsync": "off",

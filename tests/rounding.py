@@ -19,8 +19,6 @@ import numpy as np
 from mechanics.problem.problem import ContactProblem
 from mechanics.scene.scene import Block
 
-__all__ = ["perturb"]
-
 WAY = "MOMA_ROUNDING"  # the environment variable with the number of a way
 UNITS = 4
 MOVED = {Block: ("vertices",), ContactProblem: ("u_free", "bias", "friction")}

@@ -20,8 +20,6 @@ from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership
 from archmodel.tables.structures import Structure, structure_kind_named
 from ground.errors import UsageError
 
-__all__ = ["declare_members", "declare_relation", "declare_structure"]
-
 
 def declare_structure(
     session: Session,

@@ -21,8 +21,6 @@ from archmodel.tables.registered import Canon, all_kinds
 from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 
-__all__ = ["check_canon", "declare_canon", "withdraw_canon"]
-
 
 def declare_canon(
     session: Session, entry: Entry, kind: str, proportions: str, tolerance: float | None = None

@@ -32,8 +32,6 @@ from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
 from ground.errors import DatabaseError, UsageError
 
-__all__ = ["correct", "replace_measurement"]
-
 _GEOMETRY = ("depth", "depth_sigma", "depth_source", "depth_origin", "volume", "x", "y", "z")
 
 

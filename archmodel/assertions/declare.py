@@ -26,16 +26,6 @@ from archmodel.tables.structures import Structure
 from archmodel.tables.terms import term_for, vocabulary
 from ground.errors import UsageError
 
-__all__ = [
-    "PROPERTIES",
-    "PropertyValue",
-    "declare_document",
-    "declare_material",
-    "declare_named",
-    "declare_phase",
-    "declare_property",
-]
-
 PROPERTIES: Mapping[str, tuple[str, str]] = {
     "density": ("kg/m³", "mass by volume"),
     "young": ("Pa", "Young's modulus"),

@@ -15,8 +15,6 @@ from archmodel.tables.knowledge import Decision, Statement
 from archmodel.tables.opinions import DISPUTABLE, RULES, OpinionRule
 from ground.errors import UsageError
 
-__all__ = ["decide", "says", "set_rule"]
-
 
 def decide(
     session: Session,

@@ -13,8 +13,6 @@ from archmodel.tables.knowledge import (
 )
 from archmodel.tables.stratigraphy import Stratigraphy
 
-__all__ = ["entry_values", "statement_values"]
-
 Values = dict[str, object]
 
 

@@ -18,8 +18,6 @@ from archmodel.tables.hierarchy import kind_among, kind_chain, kind_of
 from archmodel.tables.registered import NO_ATTRIBUTES, RegisteredKind, all_kinds, declare_registered
 from ground.errors import QueryError, UsageError
 
-__all__ = ["MAX_LEVELS", "register_kind"]
-
 MAX_LEVELS = 20
 """Most kinds from the most general one down to the most particular."""
 

@@ -40,21 +40,6 @@ from archmodel.tables.knowledge import (
 from archmodel.tables.terms import term_for, vocabulary
 from ground.errors import UsageError
 
-__all__ = [
-    "PLAIN",
-    "SINGLE",
-    "Remark",
-    "remark_row",
-    "say_depth",
-    "say_made_of",
-    "say_mason_mark",
-    "say_note",
-    "say_observation",
-    "say_of_phase",
-    "say_reference",
-    "without_replaced",
-]
-
 SINGLE: tuple[type[Statement], ...] = (MadeOf, OfPhase, DepthEvidence)
 """Statements of which an author has at most one about a subject."""
 

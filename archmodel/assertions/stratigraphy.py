@@ -20,16 +20,6 @@ from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE, SYMMETRIC, Strat
 from archmodel.tables.structures import StratigraphicUnit, Structure
 from ground.errors import UsageError
 
-__all__ = [
-    "Thing",
-    "declare_units",
-    "relation_named",
-    "say_stratigraphy",
-    "subjects_named",
-    "subjects_of",
-    "withdraw_stratigraphy",
-]
-
 _FORWARD = {inverse: name for name, inverse in INVERSE.items()}
 _COLUMNS = ("entity_id", "structure_id", "relation", "object_entity_id", "object_structure_id")
 _Key = tuple[int | None, int | None, str, int | None, int | None]

@@ -14,8 +14,6 @@ from archmodel.tables.knowledge import Document, Observation
 from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, keep, spelling_of, vocabulary
 from ground.errors import UsageError
 
-__all__ = ["declare_term", "withdraw_term"]
-
 _LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{1,8})*")
 
 Labels = Mapping[str, str | Sequence[str]]

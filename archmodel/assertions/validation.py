@@ -8,15 +8,6 @@ from collections.abc import Iterable
 from archmodel.tables.base import LARGEST_INTEGER
 from ground.errors import UsageError
 
-__all__ = [
-    "checked_choice",
-    "checked_label",
-    "checked_number",
-    "checked_text",
-    "checked_whole",
-    "checked_years",
-]
-
 MAX_TEXT = 10_000
 """Longest text [characters]; a longer one belongs in a document."""
 

@@ -20,8 +20,6 @@ from archmodel.tables.knowledge import DepthEvidence, Statement
 from archmodel.tables.relations import INVERSE, RELATIONS, SYMMETRIC, Membership, Relation
 from ground.errors import UsageError
 
-__all__ = ["withdraw_members", "withdraw_relations", "withdraw_statements"]
-
 
 def withdraw_statements(
     session: Session,

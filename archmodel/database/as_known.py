@@ -26,8 +26,6 @@ from archmodel.tables.registered import declare_registered
 from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 
-__all__ = ["EarlierStates", "as_known", "entry_named"]
-
 _REVISED = (Material, Phase, Document, Structure)
 """Tables whose rows keep their number when they are revised, the earlier contents in a row of their own."""
 

@@ -8,8 +8,6 @@ from typing import Any
 from sqlalchemy import event, text
 from sqlalchemy.orm import Session
 
-__all__ = ["Deadline", "deadline"]
-
 _CANCELLED = "57014"  # SQLSTATE of a statement that PostgreSQL gave up, in any language
 _INSTRUCTIONS = 2_000  # of SQLite's machine between two looks at the clock: tens of microseconds
 

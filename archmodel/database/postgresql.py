@@ -12,8 +12,6 @@ from archmodel.tables.base import json_text
 from archmodel.tables.layout import metadata
 from ground.errors import DatabaseError, MissingLibraryError
 
-__all__ = ["HOW_TO_WRITE", "WRITE_LOCK", "PostgresqlServer"]
-
 HOW_TO_WRITE = "postgresql://USER@HOST/NAME"
 """The URL of a database on a server."""
 

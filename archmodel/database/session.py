@@ -18,8 +18,6 @@ from archmodel.tables.layout import SCHEMA_VERSION, SchemaVersion, metadata
 from archmodel.tables.registered import declare_registered, release_registered
 from ground.errors import DatabaseError, NoDatabaseError
 
-__all__ = ["Database", "Home", "home_of", "missing_columns", "open_database", "version_of"]
-
 _COLUMNS = {
     "sqlite": "SELECT m.name, c.name FROM sqlite_master AS m, pragma_table_info(m.name) AS c WHERE m.type = 'table'",
     "postgresql": "SELECT table_name, column_name FROM information_schema.columns "

@@ -16,8 +16,6 @@ from sqlalchemy.pool import ConnectionPoolEntry, StaticPool
 from archmodel.tables.base import json_text
 from ground.errors import DatabaseError, NoDatabaseError
 
-__all__ = ["HOW_TO_WRITE", "SqliteFile"]
-
 HOW_TO_WRITE = "sqlite:///FILE with three slashes, e.g. sqlite:///moma.db"
 """The URL of a file."""
 

@@ -11,8 +11,6 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import Kind, kind_chain, kind_of
 from archmodel.tables.registered import TOLERANCE, Canon, canons
 
-__all__ = ["canon_values", "canons_of"]
-
 
 def canon_values(session: Session, root: str, code: str, kind: str) -> dict[str, object] | None:
     """Describe the canonical proportions that hold for a stone or structure, and how far it departs from them.

@@ -25,8 +25,6 @@ from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement, Survey
 from ground.errors import UsageError
 
-__all__ = ["describe"]
-
 Values = dict[str, Any]
 
 

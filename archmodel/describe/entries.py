@@ -6,8 +6,6 @@ from sqlalchemy.orm import Session
 from archmodel.assertions.plain_values import entry_values
 from archmodel.tables.entries import Entry
 
-__all__ = ["list_entries"]
-
 
 def list_entries(session: Session) -> list[dict[str, object]]:
     """Return number, action, author, source and time of every act of recording, oldest first."""

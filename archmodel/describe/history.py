@@ -27,8 +27,6 @@ from archmodel.tables.runs import EntityResult, Run
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement
 
-__all__ = ["Event", "history", "known_at"]
-
 Values = dict[str, object]
 
 

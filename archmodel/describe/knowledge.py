@@ -14,8 +14,6 @@ from archmodel.tables.opinions import DISPUTABLE, OpinionRule, preference, rule_
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 
-__all__ = ["Owner", "ancestors", "knowledge", "memberships", "owners_of", "owners_of_structure"]
-
 Values = dict[str, object]
 
 _LISTS: Mapping[str, str] = {

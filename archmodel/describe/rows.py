@@ -10,8 +10,6 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.structures import Structure
 
-__all__ = ["entity_row", "first_values", "structures_named"]
-
 
 def entity_row(session: Session, number: int) -> dict[str, Any]:
     """Return the columns of an entity."""

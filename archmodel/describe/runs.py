@@ -14,8 +14,6 @@ from archmodel.tables.structures import Structure, structure_kinds
 from archmodel.tables.surveys import Simplification
 from ground.errors import UsageError
 
-__all__ = ["JOINT_VALUES", "compare_runs", "describe_run", "list_runs"]
-
 ERRORS = tuple(name for name in quantities_of("run") if name in Run.__table__.c)
 """Columns of a run that say how far it can be trusted [-]."""
 

@@ -13,8 +13,6 @@ from archmodel.tables.registered import Proportions, canons
 from archmodel.tables.structures import Structure
 from archmodel.tables.terms import VOCABULARIES, Term
 
-__all__ = ["RELATION_DEFINITIONS", "schema"]
-
 RELATION_DEFINITIONS = {
     "rests_on": "a bed joint brings its load down to the other",
     "supports": "the other rests on it",

@@ -14,8 +14,6 @@ from archmodel.tables.runs import EntityResult, Run
 from archmodel.tables.surveys import Measurement, Simplification
 from ground.errors import UsageError
 
-__all__ = ["Trace", "trace"]
-
 
 @dataclass(frozen=True)
 class Trace:

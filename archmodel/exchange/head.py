@@ -14,19 +14,6 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.layout import SCHEMA_VERSION
 from ground.errors import ExchangeError
 
-__all__ = [
-    "ADDED",
-    "FORMAT",
-    "FORMAT_VERSION",
-    "HEAD",
-    "READ",
-    "SINCE",
-    "TABLES",
-    "check_head",
-    "head_of",
-    "head_schema",
-]
-
 FORMAT = "moma building"
 FORMAT_VERSION = 1
 """Version of the document's grammar; that of the tables is `SCHEMA_VERSION`."""

@@ -16,8 +16,6 @@ from archmodel.tables.base import declared_attribute
 from archmodel.tables.hierarchy import Kind
 from archmodel.tables.layout import SCHEMA_VERSION
 
-__all__ = ["building_schema", "schema_text"]
-
 _NULL: Schema = {"type": "null"}
 
 _DESCRIPTION = (

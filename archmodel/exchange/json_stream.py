@@ -13,8 +13,6 @@ from typing import Any, BinaryIO, NoReturn
 
 from ground.errors import ExchangeError
 
-__all__ = ["VALUE_LIMIT", "JsonText"]
-
 CHUNK = 1 << 20
 """Bytes that are read at once."""
 

@@ -18,8 +18,6 @@ from archmodel.migrations.versions.v2_quality_and_evidence import credit_stateme
 from archmodel.tables.registered import RegisteredKind, declare_registered, release_registered
 from ground.errors import DatabaseError, ExchangeError
 
-__all__ = ["import_building"]
-
 
 def import_building(path: str | Path, database: Database) -> dict[str, int]:
     """Read a document into an empty database, all of it or nothing.

@@ -13,8 +13,6 @@ from archmodel.tables.hierarchy import Kind, kinds_below
 from archmodel.tables.registered import Canon, RegisteredKind
 from ground.errors import ExchangeError, QueryError
 
-__all__ = ["Row", "RowReader", "nearest", "quoted_key"]
-
 
 @dataclass(frozen=True, slots=True)
 class Row:

@@ -18,8 +18,6 @@ from archmodel.tables.layout import SchemaVersion
 from archmodel.tables.registered import RegisteredKind
 from archmodel.tables.structures import Structure
 
-__all__ = ["Field", "Label", "Section", "sections"]
-
 _READING_ORDER = (
     "entries",
     "registered",

@@ -14,8 +14,6 @@ from archmodel.exchange.values import quoted
 from archmodel.store.bulk import BATCH, insert_rows
 from ground.errors import ExchangeError
 
-__all__ = ["SectionStore"]
-
 Values = dict[str, Any]
 
 WEIGHT = 1 << 22

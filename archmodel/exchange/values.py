@@ -18,8 +18,6 @@ from sqlalchemy import JSON, Boolean, Column, Date, Float, Integer, String
 from archmodel.arrays import Array
 from archmodel.tables.base import ArrayType, UtcDateTime
 
-__all__ = ["INSTANT", "NUMBER", "Mismatch", "Schema", "Value", "quoted", "value_of"]
-
 Schema = dict[str, Any]
 
 INFINITIES = {"Infinity": math.inf, "-Infinity": -math.inf}

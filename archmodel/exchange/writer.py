@@ -20,8 +20,6 @@ from archmodel.exchange.values import Mismatch
 from archmodel.tables.base import ArrayType
 from ground.errors import ExchangeError
 
-__all__ = ["export_building", "write_building"]
-
 COMPRESSION = 4
 """Of gzip: higher levels take twice the time for a few percent."""
 

@@ -2,5 +2,3 @@
 
 Public: `Migration`, `migrate` (migrate); `begin_layout`, `carry`, `carry_rows`, `end_layout`, `read` (steps).
 """
-
-__all__: list[str] = []

@@ -20,8 +20,6 @@ from archmodel.migrations.layouts import version1
 from archmodel.tables.layout import SCHEMA_VERSION, metadata
 from ground.errors import DatabaseError, UsageError
 
-__all__ = ["Migration", "migrate"]
-
 LAYOUTS = {1: version1.metadata, 2: metadata}
 """Tables of each version."""
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from sqlalchemy import Connection, MetaData, Row, Select, Table, func, insert, inspect, select, text, update
 
-__all__ = ["begin_layout", "carry", "carry_rows", "end_layout", "read"]
-
 _ASIDE = "old_"
 _BATCH = 500  # rows: memory does not grow with the database
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, object_session
 
 from archmodel.arrays import Array
 from archmodel.query.attributes import ATTRIBUTES, Attribute, attributes_of
-from archmodel.query.compile import column_named, condition, condition_in
+from archmodel.query.compile import column_named, condition_in
 from archmodel.query.grammar import attributes_in, parse
 from archmodel.query.names import refuse_unknown_run
 from archmodel.query.scope import Context, Scope, StructureScope
@@ -19,20 +19,6 @@ from archmodel.tables.hierarchy import kind_among, kinds_below
 from archmodel.tables.registered import all_kinds, refuse_unknown_kinds
 from archmodel.tables.structures import Structure, structure_kinds
 from ground.errors import DatabaseError, QueryError, UsageError
-
-__all__ = [
-    "MAX_EXPRESSIONS",
-    "FoundFace",
-    "asked_columns",
-    "attributes",
-    "condition",
-    "find",
-    "find_faces",
-    "find_rows",
-    "row_of",
-    "rows_of",
-]
-
 
 MAX_EXPRESSIONS = 20
 """Most expressions in one query: together they stay below the number of parameters that SQLite takes."""

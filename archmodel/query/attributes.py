@@ -37,8 +37,6 @@ from archmodel.tables.knowledge import Correction
 from archmodel.tables.runs import EntityResult
 from archmodel.tables.surveys import Measurement, Simplification
 
-__all__ = ["ATTRIBUTES", "CANON", "Attribute", "attributes_of", "own_attributes_of"]
-
 
 @dataclass(frozen=True)
 class Attribute:

@@ -37,29 +37,6 @@ from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Structure
 from ground.errors import QueryError
 
-__all__ = [
-    "DOCUMENTING",
-    "Compiler",
-    "Test",
-    "Value",
-    "any_mark",
-    "count",
-    "departure",
-    "different_marks",
-    "documents",
-    "of_entity",
-    "of_marks",
-    "of_material",
-    "of_measurement",
-    "of_observations",
-    "of_relations",
-    "of_result",
-    "of_simplification",
-    "of_values",
-    "rows",
-    "structures",
-]
-
 Value = Callable[[Scope, int | None], ColumnElement[Any]]
 
 Test = Callable[[ColumnElement[Any]], ColumnElement[bool]]

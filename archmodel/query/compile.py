@@ -39,8 +39,6 @@ from archmodel.tables.hierarchy import names_below
 from archmodel.tables.structures import structure_kind_named
 from ground.errors import UsageError
 
-__all__ = ["column_named", "condition", "condition_in"]
-
 Where = Scope | StructureScope
 
 _OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {

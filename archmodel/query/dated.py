@@ -16,8 +16,6 @@ from archmodel.tables.knowledge import OfPhase, Phase, Statement
 from archmodel.tables.opinions import preference, rule_of
 from archmodel.tables.structures import Structure
 
-__all__ = ["load_dates"]
-
 
 def load_dates(session: Session, codes: Sequence[str]) -> Mapping[str, Dated]:
     """Return the phases of units and stones, by the opinion that holds: their own, or of the nearest structure."""

@@ -13,9 +13,6 @@ from archmodel.arrays import Array
 from archmodel.query.api import FoundFace
 from ground.errors import UsageError
 
-__all__ = ["MAX_ANGLE", "feature_collection", "flattened"]
-
-
 MAX_ANGLE = math.radians(30.0)
 """Faces that look farther than this from the mean direction are not of one wall [rad]."""
 

@@ -30,25 +30,6 @@ from dataclasses import dataclass, replace
 
 from archmodel.query.tokens import Token, complaint, named, tokenise
 
-__all__ = [
-    "MAX_CALLS",
-    "MAX_DEPTH",
-    "All",
-    "Amount",
-    "AmountComparison",
-    "AnyOf",
-    "Call",
-    "Comparison",
-    "IsIn",
-    "IsNull",
-    "Like",
-    "Node",
-    "Not",
-    "Term",
-    "attributes_in",
-    "parse",
-]
-
 MAX_DEPTH = 30
 """Deepest nesting of parentheses, nots and functions."""
 

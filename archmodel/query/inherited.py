@@ -32,16 +32,6 @@ from archmodel.tables.opinions import DISPUTABLE, OpinionRule, preference
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 
-__all__ = [
-    "Alias",
-    "Opinions",
-    "entities_with_statement",
-    "held",
-    "observations_of",
-    "statements_of",
-    "statements_of_structures",
-]
-
 MAX_LEVELS = 40
 """Deepest structure within structures; ends the search where structures contain one another in a circle."""
 

@@ -16,20 +16,6 @@ from archmodel.tables.surveys import Survey
 from archmodel.tables.terms import vocabulary
 from ground.errors import QueryError, UsageError
 
-__all__ = [
-    "author_named",
-    "campaign_named",
-    "document_named",
-    "marks_named",
-    "meant",
-    "phase_begins",
-    "refuse_unknown_run",
-    "run_with_number",
-    "stone_named",
-    "structure_named",
-    "terms_named",
-]
-
 MAX_SHOWN = 12
 """So many names are listed where none is like what was written."""
 

@@ -31,8 +31,6 @@ from archmodel.tables.opinions import rule_of
 from archmodel.tables.runs import STUDIED, EntityResult, Run
 from archmodel.tables.surveys import Measurement, Simplification, Survey
 
-__all__ = ["MAX_FUNCTIONS", "MAX_RUNS", "Context", "Scope", "StructureScope", "among"]
-
 MAX_FUNCTIONS = 40
 """Most functions in one query, those within functions and within canonical proportions included."""
 

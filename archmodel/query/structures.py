@@ -17,8 +17,6 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.runs import StructureResult
 from archmodel.tables.structures import Structure, structure_kinds
 
-__all__ = ["STRUCTURE_ATTRIBUTES"]
-
 Source = Callable[[StructureScope, int | None], ColumnElement[Any]]
 
 

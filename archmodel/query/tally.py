@@ -11,8 +11,6 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import MasonMark
 from ground.errors import UsageError
 
-__all__ = ["Tally", "count_by", "kind_has_marks", "sorted_rows"]
-
 Row = Mapping[str, object]
 
 MARK = "mark"

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from ground.errors import QueryError
 
-__all__ = ["KEYWORDS", "MAX_LENGTH", "Token", "complaint", "named", "tokenise"]
-
 MAX_LENGTH = 2000
 """Longest expression [characters]."""
 

@@ -15,9 +15,6 @@ import numpy as np
 from archmodel.arrays import Array
 from archmodel.store.stone_arrays import StoneColumns
 
-__all__ = ["ArchJoint", "ArchRings", "ArchStone", "arches_among"]
-
-
 _ONE_WAY = 0.9  # length of the mean of unit normals of faces that look one way
 _CROSSED = np.sin(
     np.radians(45.0)

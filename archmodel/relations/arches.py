@@ -17,8 +17,6 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import Membership, Relation
 from archmodel.tables.structures import Structure, structure_kind_named
 
-__all__ = ["arch_parts", "find_arches"]
-
 
 def find_arches(session: Session) -> list[ArchRings]:
     """Find the arches that the relations of the voussoirs form, by the smallest number of their stones."""

@@ -17,9 +17,6 @@ from archmodel.tables.hierarchy import names_below
 from archmodel.tables.relations import RELATIONS
 from ground.errors import UsageError
 
-__all__ = ["FoundRelations", "RelationSettings", "StoneContacts", "StonesOf", "relations_between"]
-
-
 _RESTS_ON, _BESIDE, _BONDED, _ACROSS = (
     RELATIONS.index(name) for name in ("rests_on", "beside", "bonded_with", "across_the_wall")
 )

@@ -16,8 +16,6 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.relations import Relation
 
-__all__ = ["arch_values", "give_values", "tail_lengths"]
-
 _VALUE_ROUNDING = 1e-9  # values that differ by less, in m or rad, are one value computed twice
 
 

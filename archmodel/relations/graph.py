@@ -11,7 +11,7 @@ from itertools import groupby
 from sqlalchemy import ColumnElement, func, select, union_all
 from sqlalchemy.orm import Session, aliased
 
-from archmodel.relations.load_paths import LoadPath, LoadPathStone, load_path, place_of
+from archmodel.relations.load_paths import place_of
 from archmodel.store.find_by_code import no_such_code
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import held_at
@@ -19,20 +19,6 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import INVERSE, Membership, Relation
 from archmodel.tables.structures import Course, Structure
 from ground.errors import UsageError
-
-__all__ = [
-    "CourseStones",
-    "LoadPath",
-    "LoadPathStone",
-    "NearStone",
-    "Neighbour",
-    "carried_by",
-    "carries",
-    "courses_in_order",
-    "load_path",
-    "neighbours",
-    "stones_near",
-]
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from archmodel.store.revisions import table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.relations import Relation
 
-__all__ = ["LoadPath", "LoadPathStone", "load_path", "place_of"]
-
 
 @dataclass(frozen=True, slots=True)  # slots: paths of 10,000 stones are usual, and each is made anew
 class LoadPathStone:

@@ -12,8 +12,6 @@ from archmodel.tables.hierarchy import kind_chain, kind_of
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 
-__all__ = ["StructureMembers", "members_of_structures"]
-
 
 @dataclass(frozen=True)
 class StructureMembers:

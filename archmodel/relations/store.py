@@ -17,9 +17,6 @@ from archmodel.tables.base import Base
 from archmodel.tables.entries import Entry, new_entry
 from archmodel.tables.relations import RELATIONS, Relation
 
-__all__ = ["Act", "Changes", "held_settings", "store_relations", "supersede"]
-
-
 _NUMBER_ROUNDING = 1e-6
 """Numbers of a joint that differ by less [m, m²] are those of the same joint, computed about another place."""
 

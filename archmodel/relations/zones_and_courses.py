@@ -16,16 +16,6 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Course, Structure, structure_kind_named
 
-__all__ = [
-    "StructurePart",
-    "along_the_wall",
-    "course_code",
-    "parts_of_survey",
-    "store_parts",
-    "whole_courses",
-]
-
-
 _ONE_WAY = 0.5  # length of the mean of the faces' directions in plan from which on they look one way
 _LONG = 3.0  # a course so many times as long as wide is a wall, else it runs around a tower
 

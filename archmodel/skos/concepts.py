@@ -9,8 +9,6 @@ from urllib.parse import unquote
 from archmodel.skos.triples import RDF, Literal, Node, Triple, read_triples, refuse
 from archmodel.tables.terms import VOCABULARIES
 
-__all__ = ["ENDINGS", "SCHEME", "SKOS", "Concept", "Scheme", "read_scheme"]
-
 SKOS = "http://www.w3.org/2004/02/skos/core#"
 """Namespace of SKOS."""
 

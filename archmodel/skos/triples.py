@@ -7,8 +7,6 @@ from xml.sax import SAXParseException
 
 from ground.errors import UsageError
 
-__all__ = ["RDF", "Literal", "Node", "Triple", "read_triples", "refuse"]
-
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 """Namespace of RDF."""
 

@@ -10,8 +10,6 @@ from archmodel.skos.concepts import SCHEME, SKOS
 from archmodel.tables.entries import held_at
 from archmodel.tables.terms import VOCABULARIES, Term
 
-__all__ = ["write_turtle"]
-
 _TERM = "urn:moma:term:"
 _ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 _UNSAFE = '<>"{}|^`\\'

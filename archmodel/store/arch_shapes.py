@@ -19,8 +19,6 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Arch, Structure
 from archmodel.tables.surveys import Measurement
 
-__all__ = ["ArchShape", "arch_shape", "arch_shapes"]
-
 
 @dataclass(frozen=True)
 class ArchShape:

@@ -11,8 +11,6 @@ from sqlalchemy.orm import Session
 
 from archmodel.tables.base import Base
 
-__all__ = ["BATCH", "batches", "first_free_id", "insert_rows"]
-
 BATCH = 500
 """Rows per statement: fewer than SQLite's limit of parameters, and memory does not grow with what is stored."""
 

@@ -19,19 +19,6 @@ from archmodel.store.bulk import batches
 from archmodel.tables.surveys import Measurement, Survey
 from ground.polygons import area_and_centroid
 
-__all__ = [
-    "SIGNIFICANT",
-    "Comparison",
-    "Displacement",
-    "FacePlace",
-    "campaigns",
-    "compare",
-    "displacement",
-    "displacements",
-    "face_place",
-    "measured_again",
-]
-
 Key = TypeVar("Key", bound=Hashable)
 
 SIGNIFICANT = 3.368

@@ -15,16 +15,6 @@ from archmodel.tables.knowledge import Correction, Document, Material, Phase
 from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 
-__all__ = [
-    "Subjects",
-    "entity_numbers",
-    "held_named",
-    "held_or_none",
-    "no_such_code",
-    "structure_numbers",
-    "subjects",
-]
-
 T = TypeVar("T", Material, Phase, Document, Structure)
 
 MAX_CANDIDATES = 1000

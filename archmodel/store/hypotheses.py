@@ -23,8 +23,6 @@ from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement, Survey
 from ground.errors import DatabaseError, UsageError
 
-__all__ = ["store_hypotheses", "withdraw_hypotheses"]
-
 _GIVEN_UP = ("course", "zone", *(name for name in MEASURED if name != "hypothesis"))
 """Columns that become unknown when a hypothesis is withdrawn."""
 

@@ -11,8 +11,6 @@ from typing import Any
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
-__all__ = ["Lookalikes", "explained", "plain_form"]
-
 _LETTERS = str.maketrans(
     "АВЕЅІЈКМНОРСТУХԌԚԜѴаеорсухѕіјһԁԛԝѵӏ" + "ΑΒΕΖΗΙΚΜΝΟΡΤΥΧαγικνορυ" + "ıօ‐‑‒–—−’‘′∕⁄",
     "ABESIJKMHOPCTYXGQWVaeopcyxsijhdqwvl" + "ABEZHIKMNOPTYXayikvopu" + "io------'''//",

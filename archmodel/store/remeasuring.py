@@ -13,8 +13,6 @@ from archmodel.tables.entities import CORRECTABLE, Entity
 from archmodel.tables.knowledge import Correction
 from archmodel.tables.surveys import Measurement
 
-__all__ = ["MEASURED", "supersede_measurements"]
-
 MEASURED = tuple(name for name in ENTITY_COLUMNS if name not in CORRECTABLE)
 """Columns of an entity that follow from its measurement. Kind, code, course and zone do not: whoever corrected them
 knew more than the survey."""

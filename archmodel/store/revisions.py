@@ -29,8 +29,6 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 from ground.errors import DatabaseError, UsageError
 
-__all__ = ["NOTHING", "RowCounts", "end_rows", "revise", "supersede", "table_of", "withdraw"]
-
 
 @dataclass(frozen=True)
 class RowCounts:

@@ -9,18 +9,6 @@ from dataclasses import dataclass, field
 
 from archmodel.arrays import Array, Values
 
-__all__ = [
-    "Columns",
-    "ErrorMeasures",
-    "MovingStone",
-    "RunRecord",
-    "SimplificationRecord",
-    "StoneResult",
-    "StructureValues",
-    "without_rounding",
-]
-
-
 Columns = Mapping[str, Values]
 """Columns of a table by name, equally long."""
 

@@ -37,16 +37,6 @@ from archmodel.tables.runs import (
 from archmodel.tables.surveys import Simplification
 from ground.errors import DatabaseError
 
-__all__ = [
-    "cell_rows",
-    "plain",
-    "result_row",
-    "run_row",
-    "simplification_row",
-    "store_run",
-    "table_rows",
-]
-
 _CHUNK = 5_000
 """Rows that are Python objects at a time, so that of a million contact points only the arrays are in memory."""
 

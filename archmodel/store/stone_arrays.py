@@ -18,18 +18,6 @@ from archmodel.store.revisions import table_of
 from archmodel.tables.entities import Entity
 from archmodel.tables.surveys import Measurement
 
-__all__ = [
-    "ENTITY",
-    "StoneColumns",
-    "StoneFace",
-    "id_conditions",
-    "joined",
-    "near_box",
-    "stone_columns",
-    "stone_faces",
-    "stone_shapes",
-]
-
 Faces = tuple[tuple[int, ...], ...]
 
 _AT_ONCE = 2000  # rows that are fetched together

@@ -7,8 +7,6 @@ import numpy as np
 
 from archmodel.arrays import Array
 
-__all__ = ["StoneRecord"]
-
 
 @dataclass(frozen=True)
 class StoneRecord:

@@ -22,16 +22,6 @@ from archmodel.tables.hierarchy import kind_of
 from archmodel.tables.surveys import Measurement
 from ground.errors import DatabaseError, GeometryError, SurveyError, UsageError
 
-__all__ = [
-    "ENTITY_COLUMNS",
-    "entity_rows",
-    "measurement_row",
-    "solid_volume",
-    "solid_volumes",
-    "stone_record",
-    "storable",
-]
-
 
 def entity_rows(stones: Sequence[StoneRecord], places: Sequence[str]) -> list[dict[str, object]]:
     """Return the rows of the `entity` table, without their keys.

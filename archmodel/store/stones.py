@@ -17,8 +17,6 @@ from archmodel.tables.entries import new_entry
 from archmodel.tables.surveys import Measurement, Survey
 from ground.errors import DatabaseError
 
-__all__ = ["StoredSurvey", "insert_stones", "load_stones", "store_survey", "survey_with_hash"]
-
 
 @dataclass(frozen=True)
 class StoredSurvey:

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from archmodel.stratigraphy.order import Link, Order
 from archmodel.tables.stratigraphy import SYMMETRIC
 
-__all__ = ["Bounds", "Contradiction", "Dated", "contradictions", "date_bounds"]
-
 
 @dataclass(frozen=True)
 class Dated:

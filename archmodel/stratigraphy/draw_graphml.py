@@ -9,8 +9,6 @@ from archmodel.stratigraphy.order import Link, Order
 from archmodel.stratigraphy.palette import UNIT_KINDS, G, Y
 from archmodel.tables.stratigraphy import SYMMETRIC
 
-__all__ = ["write_graphml"]
-
 _WIDTH, _HEIGHT, _STEP = 90.0, 30.0, 60.0  # of nodes, and between rows, in yEd's units
 _HEADER = _HEIGHT  # of the table
 _KEYS = (

@@ -4,8 +4,6 @@ import re
 
 from ground.errors import UsageError
 
-__all__ = ["year_bounds"]
-
 Bounds = tuple[int | None, int | None]
 
 _YEAR = re.compile(r"(?P<sign>-?)(?P<year>[0-9X]{1,4}|[0-9]{5,6})(-[0-9]{2}(-[0-9]{2})?)?[?~%]?")

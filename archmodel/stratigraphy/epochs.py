@@ -12,8 +12,6 @@ from xml.etree import ElementTree as etree
 from archmodel.stratigraphy.dates import Dated
 from archmodel.stratigraphy.palette import G, Y, label_of
 
-__all__ = ["Lane", "lane_of", "lanes_of"]
-
 _YEARS = re.compile(r"\[([^\[\]]*)\]\s*$")
 _YEAR = re.compile(r"(start|end)\s*:\s*(-?\d+)")
 

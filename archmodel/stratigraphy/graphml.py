@@ -23,8 +23,6 @@ from archmodel.stratigraphy.palette import COMMON, G, Y, box_of, label_of, line_
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from ground.errors import UsageError
 
-__all__ = ["ABSOLUTE", "WRITTEN_BY", "DrawnUnit", "GraphmlStratigraphy", "read_graphml"]
-
 WRITTEN_BY = "written by MOMA"
 """Description of the drawings that this program writes, which yEd keeps."""
 

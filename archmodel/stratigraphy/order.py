@@ -12,8 +12,6 @@ from itertools import pairwise
 from archmodel.tables.stratigraphy import LATER
 from ground.errors import UsageError
 
-__all__ = ["Link", "Order", "check_order", "find_loop", "order_of"]
-
 
 @dataclass(frozen=True)
 class Link:

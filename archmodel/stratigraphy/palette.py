@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as etree
 
-__all__ = ["COMMON", "UNIT_KINDS", "Box", "G", "Y", "box_of", "label_of", "line_kind"]
-
 G, Y = "http://graphml.graphdrawing.org/xmlns", "http://www.yworks.com/xml/graphml"
 """Namespaces of GraphML and of yEd's drawings."""
 

@@ -18,8 +18,6 @@ from archmodel.tables.stratigraphy import Stratigraphy
 from archmodel.tables.structures import StratigraphicUnit, Structure
 from ground.errors import UsageError
 
-__all__ = ["KIND_NOTE", "load_drawn", "load_links", "load_stones", "load_units", "with_years"]
-
 KIND_NOTE = "unit kind"
 """Key of the notes with the kinds of units in the Extended Matrix."""
 

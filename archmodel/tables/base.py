@@ -19,21 +19,6 @@ from sqlalchemy.types import TypeDecorator
 
 from archmodel.arrays import Array
 
-__all__ = [
-    "JSON_TYPE",
-    "LARGEST_INTEGER",
-    "TEXT",
-    "ArrayType",
-    "Base",
-    "StoneAttribute",
-    "UtcDateTime",
-    "annotation_of",
-    "attribute",
-    "declared_attribute",
-    "declared_attributes",
-    "json_text",
-]
-
 TEXT = String().with_variant(String(collation="C"), "postgresql")
 """Text compared by code points on every database, whatever its locale."""
 

@@ -49,44 +49,6 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.hierarchy import Kind, kind_among, kind_chain, kind_of, kinds_below
 from archmodel.tables.surveys import Measurement
 
-__all__ = [
-    "CORRECTABLE",
-    "Ashlar",
-    "Boss",
-    "Capital",
-    "ColumnBase",
-    "ColumnPart",
-    "Coping",
-    "Corbel",
-    "Cornice",
-    "Entity",
-    "Header",
-    "Infill",
-    "Jamb",
-    "Joint",
-    "Keystone",
-    "Lintel",
-    "Mullion",
-    "Quoin",
-    "RibSegment",
-    "RibSpringer",
-    "Rubble",
-    "Shaft",
-    "Sill",
-    "Slab",
-    "Springer",
-    "Stone",
-    "Stretcher",
-    "Support",
-    "Voussoir",
-    "WebStone",
-    "canon_of",
-    "kind_named",
-    "kinds",
-    "own_attributes",
-]
-
-
 CORRECTABLE = ("kind", "code", "course", "zone")
 """Attributes of every entity that can be corrected, besides those of its kind; the others follow from its survey."""
 

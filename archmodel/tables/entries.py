@@ -14,8 +14,6 @@ from sqlalchemy.orm import Mapped, Session, declared_attr, mapped_column, relati
 
 from archmodel.tables.base import Base
 
-__all__ = ["ACTIONS", "Entry", "Recorded", "held_at", "held_index", "latest_entry", "new_entry"]
-
 ACTIONS = ("ingest", "geometry", "declaration", "correction", "run", "migration")
 """Kinds of entries: a survey taken in, relations computed, knowledge declared, attributes corrected, a simulation,
 rows moved from an older layout of the database."""

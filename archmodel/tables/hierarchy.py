@@ -11,17 +11,6 @@ from sqlalchemy.orm import Session
 
 from ground.errors import UsageError
 
-__all__ = [
-    "Kind",
-    "definition_of",
-    "kind_among",
-    "kind_chain",
-    "kind_of",
-    "kinds_below",
-    "kinds_in",
-    "names_below",
-]
-
 
 class Kind:
     """A class of a hierarchy, whose rows are in the table of its most general kind.

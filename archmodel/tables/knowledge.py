@@ -16,24 +16,6 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry, Recorded, held_index
 from archmodel.tables.structures import Structure
 
-__all__ = [
-    "OBSERVATIONS",
-    "Correction",
-    "Decision",
-    "DepthEvidence",
-    "Document",
-    "MadeOf",
-    "MasonMark",
-    "Material",
-    "MaterialProperty",
-    "Note",
-    "Observation",
-    "OfPhase",
-    "Phase",
-    "Reference",
-    "Statement",
-]
-
 OBSERVATIONS = {
     "erosion": "surface or edges are worn away",
     "crack": "it is broken through or in part",

@@ -17,8 +17,6 @@ from archmodel.tables import (
 )
 from archmodel.tables.base import Base
 
-__all__ = ["SCHEMA_VERSION", "SchemaVersion", "metadata"]
-
 SCHEMA_VERSION = 2
 """Version of the layout that this program reads and writes.
 

@@ -13,8 +13,6 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 from archmodel.tables.base import JSON_TYPE, Base
 from archmodel.tables.entries import Recorded, held_index
 
-__all__ = ["DISPUTABLE", "RULES", "OpinionRule", "preference", "rule_of"]
-
 RULES = ("latest", "certainty", "author")
 """Rules: by the date of the opinion, by its certainty, by the order of the authors."""
 

@@ -19,19 +19,6 @@ from archmodel.tables.hierarchy import Kind, kind_chain, kind_of, kinds_below, k
 from archmodel.tables.structures import Structure, structure_kinds
 from ground.errors import DatabaseError
 
-__all__ = [
-    "NO_ATTRIBUTES",
-    "TOLERANCE",
-    "Canon",
-    "Proportions",
-    "RegisteredKind",
-    "all_kinds",
-    "canons",
-    "declare_registered",
-    "refuse_unknown_kinds",
-    "release_registered",
-]
-
 NO_ATTRIBUTES = "a kind of structure, and those have no attributes of their own"
 """What is wrong with a kind of structure that has them."""
 

@@ -8,8 +8,6 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Recorded
 from archmodel.tables.structures import Structure
 
-__all__ = ["INVERSE", "RELATIONS", "SYMMETRIC", "Membership", "Relation"]
-
 RELATIONS = ("rests_on", "beside", "bonded_with", "across_the_wall")
 """The relations that are stored. `supports` is `rests_on` seen from the other side."""
 

@@ -11,18 +11,6 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.entries import Entry
 from archmodel.tables.structures import Structure
 
-__all__ = [
-    "FIDELITIES",
-    "STUDIED",
-    "CellResult",
-    "ContactPoint",
-    "EntityResult",
-    "JointResult",
-    "MechanismStone",
-    "Run",
-    "StructureResult",
-]
-
 FIDELITIES = ("fixed", "rigid", "deformable")
 """Ways to model a stone in a run."""
 

@@ -13,8 +13,6 @@ from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Statement
 from archmodel.tables.structures import Structure
 
-__all__ = ["DEFINITIONS", "INVERSE", "LATER", "SYMMETRIC", "Stratigraphy"]
-
 DEFINITIONS: Mapping[str, str] = {
     "above": "it lies on the object, and came later",
     "cuts": "it was cut into the object",

@@ -36,30 +36,6 @@ from archmodel.tables.base import Base
 from archmodel.tables.entries import Recorded, held_index
 from archmodel.tables.hierarchy import Kind, kind_among, kind_of, kinds_below
 
-__all__ = [
-    "Arch",
-    "BarrelVault",
-    "Building",
-    "Buttress",
-    "Column",
-    "Course",
-    "Crenelation",
-    "Door",
-    "Machicolation",
-    "Rib",
-    "RibVault",
-    "Storey",
-    "StratigraphicUnit",
-    "Structure",
-    "Tower",
-    "Wall",
-    "WallFacing",
-    "Web",
-    "Window",
-    "structure_kind_named",
-    "structure_kinds",
-]
-
 
 class Structure(Kind, Recorded, Base):
     """A part of the building that is made of entities and of other structures.

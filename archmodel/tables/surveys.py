@@ -7,8 +7,6 @@ from archmodel.arrays import Array
 from archmodel.tables.base import JSON_TYPE, ArrayType, Base, attribute
 from archmodel.tables.entries import Entry, Recorded, held_index
 
-__all__ = ["Measurement", "Simplification", "Survey"]
-
 
 class Survey(Base):
     """One survey file as it was taken in.

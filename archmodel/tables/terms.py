@@ -18,17 +18,6 @@ from archmodel.tables.entries import Recorded, held_at, held_index
 from archmodel.tables.knowledge import OBSERVATIONS
 from ground.errors import UsageError
 
-__all__ = [
-    "DOCUMENT_TYPES",
-    "VOCABULARIES",
-    "Term",
-    "Vocabulary",
-    "keep",
-    "spelling_of",
-    "term_for",
-    "vocabulary",
-]
-
 DOCUMENT_TYPES: Mapping[str, str] = {
     "document": "a text: a charter, an account, a report",
     "drawing": "a plan, an elevation, a sketch",

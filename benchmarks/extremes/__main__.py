@@ -29,8 +29,6 @@ from benchmarks.report import (
 )
 from mechanics.scene.scene import Method
 
-__all__ = ["main"]
-
 _REFUSED = columns("what what | words said")
 
 

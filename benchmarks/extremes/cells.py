@@ -16,8 +16,6 @@ from mechanics.problem.residual import natural_map
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.choice import choose_solver
 
-__all__ = ["TOLERANCE", "Cell", "Outcome", "attempt", "refused_cell", "solved_cells"]
-
 # η that solvers are asked for, and after how many iterations they give up
 TOLERANCE, _ITERATIONS = 1e-8, 2000
 

@@ -11,25 +11,6 @@ from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.problem.problem import ContactProblem
 
-__all__ = [
-    "HALF",
-    "MASS",
-    "Box",
-    "Truth",
-    "boxes",
-    "each_sum",
-    "grid",
-    "never",
-    "nothing",
-    "one_between_fixed",
-    "patch",
-    "slides",
-    "squeezed",
-    "stored",
-    "sums",
-    "with_last",
-]
-
 # error of the impulses (nc, 3) of a problem against what is known of its solution, relative
 Truth = Callable[[ContactProblem, Array], float]
 

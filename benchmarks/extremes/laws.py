@@ -12,9 +12,6 @@ from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem
 
-__all__ = ["broken", "judge", "velocity_of"]
-
-
 # the natural map knows a contact's distance from its law to this factor, times 1 + μ
 _SLACK = 10.0
 # of the terms of which u is the sum: rounding

@@ -37,9 +37,6 @@ from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem.problem import ContactProblem
 from mechanics.scene.scene import Fidelity, Scene
 
-__all__ = ["VELOCITY_TOLERANCE", "Row", "rows"]
-
-
 # that solvers are asked for; also what each joint of a column may let through of g h, so of the weight above it
 VELOCITY_TOLERANCE = 1e-5
 

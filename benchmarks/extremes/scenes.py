@@ -27,8 +27,6 @@ from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity, Method, Scene, SolverSettings, Start
 from mechanics.simulate import simulate
 
-__all__ = ["SceneRow", "run_cells", "scene_rows"]
-
 # what was measured, over what is right where every step is solved
 Check = Callable[[Result], float]
 

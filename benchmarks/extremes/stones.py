@@ -14,20 +14,6 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, TimeS
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 
-__all__ = [
-    "G",
-    "box",
-    "column",
-    "elastic_column",
-    "ground",
-    "moved",
-    "slabs",
-    "standing",
-    "volume",
-    "wall",
-]
-
-
 G = 9.81
 
 

@@ -10,8 +10,6 @@ from contextlib import suppress
 
 from ground.kernels.uses import COMMANDS, OTHERS, kernels_of
 
-__all__: list[str] = []
-
 if __name__ == "__main__":
     gc.disable()  # a compiler makes millions of small objects that live
     first, *later = COMMANDS

@@ -19,8 +19,6 @@ from numba.core import event
 
 from ground.kernels.uses import COMMANDS, KernelUse, kernels_of
 
-__all__ = ["compiling_beside"]
-
 
 @contextmanager
 def compiling_beside(command: str) -> Iterator[None]:

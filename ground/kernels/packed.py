@@ -12,8 +12,6 @@ import sysconfig
 from pathlib import Path
 from typing import Any
 
-__all__ = ["use_packed_kernels"]
-
 _FITTING = Path(__file__).with_name("packed.json")
 
 _WARNED = "MOMA_KERNELS_SAID"

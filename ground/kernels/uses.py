@@ -18,8 +18,6 @@ import numba
 from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["COMMANDS", "LISTS", "OTHERS", "KernelUse", "all_kernels", "called", "kernels_of", "recording"]
-
 COMMANDS = ("orient", "ingest", "run")
 """Commands with a list, in their usual order."""
 

@@ -4,8 +4,6 @@ from collections.abc import Callable
 
 from scipy.optimize import brentq
 
-__all__ = ["root_of"]
-
 _DOUBLINGS = 60  # of the upper end of the range, until the function is negative
 
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from ground.statistics.roots import root_of
 
-__all__ = ["CONSISTENT", "OUTLIER", "WITHIN", "deviation", "scatter_beyond", "spread"]
-
 Array = NDArray[np.float64]
 
 CONSISTENT = 1.4826

@@ -11,21 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from ground.errors import SurveyError
 from ground.tables.numbers import shown
 
-__all__ = [
-    "COORDINATES",
-    "LONGEST_HEAD",
-    "POINT",
-    "SIGMA",
-    "UNITS",
-    "length_scale",
-    "length_unit",
-    "meaning_of",
-    "places_of",
-    "plain",
-    "spellings",
-    "unit_of",
-]
-
 UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254} | {
     "us-ft": 1200.0 / 3937.0,
 }

@@ -5,8 +5,6 @@ import re
 from ground.errors import SurveyError
 from ground.tables.numbers import FARTHEST, parse_length, parse_number, shown
 
-__all__ = ["Decimals"]
-
 _PLAIN = re.compile(r"[-+.0-9eE]+").fullmatch  # a number to `float` made of these characters is one here too
 
 

@@ -12,8 +12,6 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Layer", "write_geopackage"]
-
 _CARTESIAN = -1  # number of the reference system that is not known
 
 _TABLES = """

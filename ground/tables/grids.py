@@ -8,8 +8,6 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["exchanged_grid", "grid_of"]
-
 
 def exchanged_grid(places: npt.NDArray[np.float64]) -> str:
     """Return the national grid that coordinates are of if easting and northing are exchanged, and of none as they are.

@@ -20,8 +20,6 @@ from ground.errors import SurveyError
 from ground.tables.columns import COORDINATES, LONGEST_HEAD, places_of
 from ground.tables.numbers import is_number, unreadable
 
-__all__ = ["NumberStream", "open_numbers"]
-
 _NUMBER = re.compile(r"\s*\"?[-+]?[\d.]")
 _FORTRAN = re.compile(r"(?<=\d)[dD](?=[-+]?\d)")
 _START = 1 << 16  # bytes by which the encoding is found

@@ -5,18 +5,6 @@ import re
 
 from ground.errors import SurveyError
 
-__all__ = [
-    "EMPTY",
-    "FARTHEST",
-    "has_groups",
-    "is_number",
-    "parse_length",
-    "parse_number",
-    "shown",
-    "ungrouped",
-    "unreadable",
-]
-
 EMPTY = frozenset(("-", "--", "–", "—", "n/a", "na", "nan", "none", "null", "?"))
 """Words for a value that is not known, in lower case."""
 

@@ -20,8 +20,6 @@ from ground.errors import SurveyError, UsageError
 from ground.tables.numbers import has_groups, shown, ungrouped, unreadable
 from ground.tables.text_lines import TextLines
 
-__all__ = ["DATE_REMEDY", "ListRows", "Row", "TextRows", "cell_text", "is_workbook", "open_rows"]
-
 Row = str | Sequence[str]
 """A line of text that is not yet split, or the cells of a sheet."""
 

@@ -17,8 +17,6 @@ from ground.tables.decimals import Decimals
 from ground.tables.numbers import is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 
-__all__ = ["Table", "TableRow", "read_table"]
-
 _SAMPLE = 50  # lines by which the separator is found
 _SEPARATORS: tuple[str, ...] = (";", "\t", "|", ",")
 _BLANKS = ""

@@ -16,8 +16,6 @@ from typing import BinaryIO
 from ground.errors import SurveyError
 from ground.tables.numbers import unreadable
 
-__all__ = ["TextLines"]
-
 _BLOCK = 1 << 18  # bytes read at a time
 _LONGEST = 1 << 16  # bytes of one line: far beyond any table that people write
 _MARK = b"\xef\xbb\xbf"

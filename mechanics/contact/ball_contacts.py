@@ -11,9 +11,6 @@ from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 from mechanics.scene.state import State
 
-__all__ = ["FaceCells", "ball_contacts", "face_cells"]
-
-
 # share of the radius: where a ball would penetrate deeper before a node sees it, or its surface rises by more over the
 # area of a node, the mesh is too coarse
 _UNSEEN = 1e-3

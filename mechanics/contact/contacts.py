@@ -11,9 +11,6 @@ from mechanics.contact._kernels.broad_phase import points_of
 from mechanics.contact._kernels.narrow_phase import NAME_BITS
 from mechanics.scene.state import State
 
-__all__ = ["NODE", "PAIR_BIT", "Contacts", "gaps", "joined", "material_points", "take"]
-
-
 # The high bits of a key name the pair of shapes; the low bits the node that carries the contact, or a single point
 # within the pair.
 NODE = 1 << NAME_BITS

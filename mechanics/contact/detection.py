@@ -35,9 +35,6 @@ from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
 from mechanics.scene.threads import at_once
 
-__all__ = ["FLAT", "THIN", "Detector"]
-
-
 FLAT = float(np.cos(np.radians(5.0)))  # cosine of the angle within which faces lie flat on one another
 # number of pairs or boxes from which another thread pays: 0.5 ms of work
 _THREAD_BATCH = 500

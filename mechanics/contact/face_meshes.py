@@ -8,9 +8,6 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.contact._kernels.facets import FacetMeshes
 
-__all__ = ["FaceMesh", "packed_meshes"]
-
-
 _WIDEST = 9  # maximum number of nodes of a facet
 
 

@@ -10,9 +10,6 @@ from mechanics.contact._kernels.points import surface_points
 from mechanics.contact.contacts import NODE, Contacts
 from mechanics.contact.surfaces import Placed, Surfaces
 
-__all__ = ["mortar_contacts", "surface_weights"]
-
-
 _ALIKE = 1e-6  # relative difference up to which two faces are equally fine or large
 # a direction to which faces of stones are unlikely to be normal
 _ASKEW = np.array([0.3015113446, 0.5381, 0.7870])

@@ -10,8 +10,6 @@ from mechanics.contact.face_meshes import FaceMesh
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.polyhedra import face_plane
 
-__all__ = ["face_meshes", "part_face_meshes"]
-
 Faces = Sequence[Sequence[int]]
 
 _FACET_DISTANCE = (

@@ -20,8 +20,6 @@ from mechanics.contact.detection import FLAT, Detector
 from mechanics.scene.scene import Placement
 from mechanics.scene.state import State
 
-__all__ = ["SLACK", "Recess", "recess_at"]
-
 SLACK = 1e-3
 """Error of a survey over the width of the smaller stone [-].
 

@@ -12,9 +12,6 @@ from mechanics.contact._kernels.narrow_phase import Polyhedra
 from mechanics.contact.face_meshes import FaceMesh, packed_meshes
 from mechanics.stones.polyhedra import alike, face_planes_alike, smallest_widths
 
-__all__ = ["Placed", "Surfaces", "middles", "surfaces"]
-
-
 # faces of the parts of a body are in one plane
 _SAME_WAY = 1.0 - 1e-12  # if the cosine between their normals is at least this
 _SAME_PLANE = 1e-6  # and their offset is at most this share of its size

@@ -8,14 +8,13 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from mechanics.contact.contacts import Contacts, material_points
-from mechanics.delassus.mixed import ELASTIC, NONE, RIGID, MixedDelassus
+from mechanics.delassus._kernels.mixed import ELASTIC, NONE, RIGID
+from mechanics.delassus.mixed import MixedDelassus
 from mechanics.delassus.rigid import RigidDelassus, Schedule
 from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.model.rigid import RigidInertia, inverse_inertia_world
 from mechanics.scene.state import State
-
-__all__ = ["local_velocity", "mixed_delassus", "rigid_delassus", "side_kinds", "world_impulse"]
 
 
 def rigid_delassus(model: Model, state: State, contacts: Contacts, schedule: Schedule) -> RigidDelassus:

@@ -16,9 +16,6 @@ from mechanics.delassus.elimination import elimination
 from mechanics.problem.forms import SparseForm
 from mechanics.problem.problem import RigidContacts
 
-__all__ = ["BodyForm", "scaled_frames"]
-
-
 # refinement steps, at most
 _REFINEMENTS = 2
 # relative change of velocities due to rounding alone [-]

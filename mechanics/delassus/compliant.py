@@ -11,8 +11,6 @@ from mechanics.arrays import Array
 from mechanics.problem.forms import Form
 from mechanics.problem.problem import Delassus, GaussSeidel, RigidContacts
 
-__all__ = ["CompliantDelassus", "CompliantForm", "simplified"]
-
 
 class CompliantForm:
     """W + E in any form; E is added to Θ.

@@ -9,8 +9,6 @@ from scipy.sparse import coo_array, csc_array
 from mechanics.arrays import Array, Ints
 from mechanics.delassus.multifrontal import Cliques, Fronts, fronts
 
-__all__ = ["CondensedForm", "assembled"]
-
 
 class CondensedForm:
     """W + Θ, factorised by stones; far smaller than a nodal system where stones have more nodes than contacts.

@@ -7,9 +7,6 @@ from scipy.sparse.linalg import splu
 from mechanics.arrays import Array, Ints
 from mechanics.delassus._kernels.dissection import dissect
 
-__all__ = ["dissection", "elimination", "least_degree"]
-
-
 # number of bodies from which dissection fills in less than least degree
 _MANY = 1000
 # size of a part that is not divided further

@@ -6,15 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.arrays import Array, Ints
-from mechanics.delassus._kernels.mixed import ELASTIC, NONE, RIGID, Sides, apply_delassus, sweep
+from mechanics.delassus._kernels.mixed import ELASTIC, RIGID, Sides, apply_delassus, sweep
 from mechanics.delassus.condensed import CondensedForm
 from mechanics.delassus.mixed_form import MixedForm, MixedPattern
 from mechanics.delassus.multifrontal import Cliques
 from mechanics.delassus.rigid import RigidDelassus
 from mechanics.problem._kernels import Laws, local_factors
 from mechanics.problem.problem import GaussSeidel, ScaledDelassus
-
-__all__ = ["ELASTIC", "NONE", "RIGID", "MixedDelassus"]
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,6 @@ from mechanics.delassus._kernels.mixed import ELASTIC, RIGID
 from mechanics.delassus.condensed import assembled
 from mechanics.delassus.multifrontal import Cliques, Factors, Fronts, fronts, fronts_of_graph
 
-__all__ = ["MixedForm", "MixedPattern", "mixed_fronts"]
-
-
 # refinement steps, at most
 _REFINEMENTS = 2
 # relative change of velocities due to rounding alone [-]

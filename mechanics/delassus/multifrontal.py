@@ -20,9 +20,6 @@ from mechanics.delassus._kernels.fronts import Layout, add_into, solve
 from mechanics.delassus.elimination import elimination
 from mechanics.scene.threads import at_once
 
-__all__ = ["Cliques", "Factors", "Fronts", "fronts", "fronts_of_graph"]
-
-
 # columns of a front that one thread takes at a time
 _PANEL = 192
 # pivots of a front, in contacts, beyond which no more are merged: a wider one is eliminated by a single thread

@@ -14,9 +14,6 @@ from mechanics.delassus.body_space import BodyForm, scaled_frames
 from mechanics.problem._kernels import Laws
 from mechanics.problem.problem import GaussSeidel, RigidContacts, mean_diagonal
 
-__all__ = ["RigidDelassus", "Schedule", "in_order", "schedule"]
-
-
 # below this number of contacts one thread sweeps: more would gain nothing
 _WORTH_PARTS = 2000
 # contacts from which there are four parts instead of two: their share of crossing contacts is larger

@@ -32,19 +32,6 @@ from mechanics.scene.scene import Method
 from mechanics.scene.state import State
 from mechanics.stones.validation import SMALLEST
 
-__all__ = [
-    "SOFTNESS",
-    "JointCompliance",
-    "contact_problem",
-    "may_yield",
-    "shifted",
-    "spring_axes",
-    "terms_of",
-    "turned_springs",
-    "unshifted",
-]
-
-
 _TOUCH = 1e-9  # overlap over a body's size that comes from rounding, and is no property of a joint [-]
 # bias of a law that does not act in a step, over the fastest free velocity: its own, infinity, is no number to solvers
 _NEVER = 1e3

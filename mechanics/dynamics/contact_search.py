@@ -19,9 +19,6 @@ from mechanics.model.deformable import Compliance
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["ContactSearch", "Detection", "contacts_as_drawn", "detection", "detector"]
-
-
 # displacements since the last detection, over the smallest width, from which contacts are detected again [-]:
 _MOVED_RIGID = 1e-6  # rigid stones: at rest nothing changes, in motion W is that of the very instant
 # the same where the motion may be wrong by much more in each step: over the speed of such an error, over the one that

@@ -20,8 +20,6 @@ from mechanics.model.model import Model
 from mechanics.model.stone_groups import ElasticGroup
 from mechanics.scene.state import State
 
-__all__ = ["EnergyBalance", "EnergyTerms"]
-
 
 class EnergyTerms(Carrier):
     """Terms of the energy balance, summed over a run of stones or of disks.

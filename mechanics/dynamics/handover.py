@@ -11,8 +11,6 @@ from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["Beginning", "Handover", "of_run"]
-
 _LOW = (1 << PAIR_BIT) - 1  # bits of a contact's key below those of its pair of shapes
 
 

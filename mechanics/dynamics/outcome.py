@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["Outcome", "StaticStart"]
-
 
 class Outcome(StrEnum):
     """End of a run.

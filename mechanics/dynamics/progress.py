@@ -9,8 +9,6 @@ from typing import Any
 
 from mechanics.carried import Carried, Carrier, Checkpointing
 
-__all__ = ["Clock", "Listener", "Progress", "SteppedRun", "silent"]
-
 
 @dataclass(frozen=True)
 class Progress:

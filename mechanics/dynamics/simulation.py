@@ -35,8 +35,6 @@ from mechanics.solvers.chain import Solver
 from mechanics.solvers.choice import choose_solver
 from mechanics.solvers.from_nothing import rests_from_nothing
 
-__all__ = ["CLOSED_BIAS", "Simulation"]
-
 CLOSED_BIAS = 1e-3
 """Bias of a gap over the largest u_free up to which it is one of an inexact step, and counts as closed [-]."""
 

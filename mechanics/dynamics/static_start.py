@@ -17,8 +17,6 @@ from mechanics.model.model import Model
 from mechanics.scene.scene import Method, SolverSettings, TimeSettings
 from mechanics.scene.state import State
 
-__all__ = ["static_start"]
-
 
 @dataclass(frozen=True)
 class _Attempt:

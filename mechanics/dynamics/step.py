@@ -15,8 +15,6 @@ from mechanics.problem.problem import ContactProblem, ContactSolution
 from mechanics.scene.laws.law import Approach, Terms
 from mechanics.scene.state import State
 
-__all__ = ["ContactForces", "Step"]
-
 
 @dataclass(frozen=True)
 class ContactForces:

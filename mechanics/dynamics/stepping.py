@@ -17,15 +17,6 @@ from mechanics.model.stone_groups import ElasticGroup
 from mechanics.scene.loads.load import Pose
 from mechanics.scene.state import State
 
-__all__ = [
-    "Kick",
-    "advance",
-    "compliances",
-    "free_kick",
-    "kicked",
-    "predict",
-]
-
 
 @dataclass(frozen=True)
 class Kick:

@@ -11,9 +11,6 @@ from mechanics.contact.contacts import PAIR_BIT
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.scene.laws.law import BOND, ENERGY, REST, SPRING, STATE
 
-__all__ = ["Memory"]
-
-
 _AHEAD = (
     0.9  # part of the last change that is expected again [-]: forces without effect must not grow by habit
 )

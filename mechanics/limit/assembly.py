@@ -31,9 +31,6 @@ from mechanics.scene.laws.table import LawTable
 from mechanics.scene.scene import Scene
 from mechanics.scene.state import State
 
-__all__ = ["CLOSED", "RigidAssembly", "Strength", "assembly", "joint_strength"]
-
-
 CLOSED = SLACK  # gap up to which a joint counts as closed, over the width of the smaller stone [-]
 
 

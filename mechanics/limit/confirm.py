@@ -25,9 +25,6 @@ from mechanics.limit.live_loads import LiveLoad
 from mechanics.scene.scene import TimeSettings
 from mechanics.simulate import simulate
 
-__all__ = ["Confirmation", "ConfirmationRun", "Likeness", "confirm", "likeness"]
-
-
 # load that is lost over that which is held at the end [-]
 _LOAD_ACCURACY = 0.03
 # step in which a stone falls by this share of the least width, and steps of a run at most

@@ -22,8 +22,6 @@ from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Block, LawRule, Part, Scene, Start
 from mechanics.simulate import simulate
 
-__all__ = ["Standing", "at_instant", "self_stress_alone_holds", "stands"]
-
 # gap over the width up to which a joint is closed where stones rest: a run leaves 1e-8, and a block falls by more [-]
 _SHUT = 1e-5
 # status of contacts whose bond has not broken, and of those that bear nothing

@@ -44,8 +44,6 @@ from mechanics.solvers.kinds import FURTHER, chain_of, standing_chain
 from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.newton import Newton
 
-__all__ = ["WIDTH", "HeldLimit", "held_limit"]
-
 WIDTH = 2e-3
 """Width of the bracket over the bound, at most [-]: friction without dilatancy decides no limit more closely."""
 

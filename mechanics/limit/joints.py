@@ -22,9 +22,6 @@ from mechanics.results.joint_sections import JointPolygons, eccentricity, sectio
 from mechanics.results.joints import resultants as summed
 from mechanics.scene.state import State
 
-__all__ = ["Joints", "Resultants", "StressBlocks", "find_joints", "resultants", "stress_blocks"]
-
-
 # compression below which a joint counts as free of force, over the largest of all joints [-]
 _FREE = 1e-6
 

@@ -28,9 +28,6 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad, Mechanism
 from mechanics.limit.live_loads import Acceleration
 
-__all__ = ["Kinematics", "kinematics"]
-
-
 # speed over the fastest below which a stone stands [-]
 _STANDS = 1e-3
 # difference of the motions of two stones at their centres, over the fastest, up to which they are one block [-]

@@ -32,17 +32,6 @@ from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
 from mechanics.limit.programme import Optimum, Programme
 
-__all__ = [
-    "Flow",
-    "LimitLoad",
-    "Mechanism",
-    "limit_load",
-    "lines_of_sliding",
-    "mechanism",
-    "slides_along_one_line",
-    "without_friction_across",
-]
-
 # slope of the fictitious strength over that of the programme before, and over the friction in the end [-]
 _FLATTER, _DILATANCY = 0.3, 1e-3
 # charge on the sum of all normal forces over the weight, in units of λ: a tenth finds states up to 10 % higher [-]

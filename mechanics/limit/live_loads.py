@@ -13,8 +13,6 @@ from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Scene
 
-__all__ = ["Acceleration", "LiveLoad", "PointForce", "SpreadForce", "levers"]
-
 
 class LiveLoad(Protocol):
     """A load of which λ times is added to the dead load."""

@@ -27,8 +27,6 @@ from mechanics.scene.rig import BEAM, JAWS, Rig, rigged
 from mechanics.scene.scene import Scene, TimeSettings
 from mechanics.scene.state import State
 
-__all__ = ["LoadingTest", "loading_test", "softening_step"]
-
 # steps over the largest way, where no other step is asked for
 _STEPS = 200
 # steps over the displacement 2 G/c in which a bond softens: at the half of its strength it is seen once at least

@@ -16,9 +16,6 @@ from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.limit.assembly import RigidAssembly, Strength
 
-__all__ = ["Ending", "Optimum", "Programme"]
-
-
 # friction from which a contact has a cone [-]
 _SMOOTH = 1e-9
 # tolerance asked of Clarabel, of gap and feasibility [-]

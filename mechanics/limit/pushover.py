@@ -32,8 +32,6 @@ from mechanics.model.model import build_model
 from mechanics.scene.loads.load import Force, Loads
 from mechanics.scene.scene import Scene, TimeSettings
 
-__all__ = ["SPEED", "Pushover", "pushover"]
-
 # speed at which the stone is led, over that of a fall through the way of the whole curve [-]
 SPEED = 0.01
 # steps in one interval of the curve, and of T

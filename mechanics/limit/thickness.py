@@ -18,9 +18,6 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism, mechanism
 from mechanics.limit.programme import Programme
 
-__all__ = ["GeometricSafety", "geometric_safety", "shrunk"]
-
-
 # share of the width of joints to which its least value is found [-]
 _WIDTH_ACCURACY = 1e-4
 # part of the largest load on a stone that forces may lack [-]

@@ -17,9 +17,6 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import Mechanism, mechanism
 from mechanics.limit.programme import Ending, Programme
 
-__all__ = ["Extreme", "Thrust", "thrust"]
-
-
 # thrust over the weight that counts as none [-]
 _THRUST_ROUNDING = 1e-8
 

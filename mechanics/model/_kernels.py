@@ -5,8 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-__all__ = ["Frames", "deform", "fly", "rigid_part"]
-
 _SUBSTEP = 0.1  # largest angle of one substep [rad]: the attitude is accurate to the second order in it
 
 

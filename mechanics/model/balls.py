@@ -9,8 +9,6 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.materials import Material
 from mechanics.stones.polyhedra import MassProperties
 
-__all__ = ["ball", "ball_properties"]
-
 
 def ball(
     code: str,

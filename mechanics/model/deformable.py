@@ -25,8 +25,6 @@ from mechanics.stones.elasticity.tensors import from_voigt, to_voigt
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.mesh import SolidMesh
 
-__all__ = ["Compliance", "Deformable", "deformable", "dissection"]
-
 _LEAF = 40  # nodes of a part that is not divided further
 
 

@@ -32,9 +32,6 @@ from mechanics.stones.polyhedra import (
     united,
 )
 
-__all__ = ["BodyCorners", "Model", "build_model", "laws_between"]
-
-
 _PLANE = 1e-6  # largest height of a corner ahead of a face, over the size of its shape [-]; as for meshes
 _SAME_VOLUME = (
     1e-6  # largest difference of the volume of a stone's parts from that of its outline, relative [-]

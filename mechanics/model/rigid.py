@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array, Bools
 from mechanics.model._kernels import fly
 
-__all__ = ["RigidInertia", "free_flight", "inverse_inertia_world"]
-
 
 @dataclass(frozen=True)
 class RigidInertia:

@@ -8,8 +8,6 @@ import numpy as np
 from mechanics.arrays import Array, Ints
 from mechanics.model.deformable import Deformable
 
-__all__ = ["ElasticGroup", "ElasticStones", "elastic_stones"]
-
 
 @dataclass(frozen=True)
 class ElasticGroup:

@@ -21,8 +21,6 @@ from mechanics.stones.meshing.meshers.mesher import Meshed, meshed_block
 from mechanics.stones.meshing.quality import MeshQuality, MeshReport, StoneMesh, mesh_quality
 from mechanics.stones.polyhedra import face_plane
 
-__all__ = ["StoneWorkshop", "touching_faces"]
-
 _FACING = -0.966  # cosine between the normals of faces that face each other: within about 15°
 _SHARED = 1e-3  # least overlap of two faces over the area of the smaller one [-]
 

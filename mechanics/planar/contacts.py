@@ -10,8 +10,6 @@ from mechanics.planar._kernels.grid import build_grid
 from mechanics.planar._kernels.walls import EndNeighbours, end_neighbours, find_walls
 from mechanics.planar.model import PlanarModel, PlanarState
 
-__all__ = ["PlanarContacts", "PlanarDetector"]
-
 
 @dataclass(frozen=True)
 class PlanarContacts:

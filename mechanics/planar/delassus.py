@@ -23,9 +23,6 @@ from mechanics.planar._kernels.sweep import (
 from mechanics.problem.forms import SparseForm
 from mechanics.problem.problem import PlaneContacts, ScaledDelassus, mean_diagonal
 
-__all__ = ["PlanarDelassus", "PlanarGaussSeidel"]
-
-
 # contacts of a part from which another thread pays: 0.1 ms of work
 _THREAD_BATCH = 10_000
 # parts at most: the contacts between them are swept by one thread

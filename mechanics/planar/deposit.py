@@ -18,8 +18,6 @@ from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Method, SolverSettings
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 
-__all__ = ["Deposit", "deposit"]
-
 _NARROWEST = 4.0  # length and height of a sample over the largest radius, at least [-]
 _MOST_DISKS = 2_000_000  # of a sample: more do not fit into the memory of most machines
 _LOW = 2.0  # of the surface below the profile over the width of the largest disk, at most [-]

@@ -9,8 +9,6 @@ from mechanics.arrays import Array, Bools
 from mechanics.planar.scene import PlanarScene
 from mechanics.scene.laws.table import LawTable, law_table
 
-__all__ = ["PlanarModel", "PlanarState", "build_planar_model"]
-
 _BLOCKED = 1e9  # of the moment of inertia of disks that do not turn [-]
 
 

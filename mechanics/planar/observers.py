@@ -12,9 +12,6 @@ from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.planar.simulation import PlanarStep
 from mechanics.planar.stepping import load_work
 
-__all__ = ["PlanarEnergy", "PlanarWatch", "disk_speed", "imbalance", "kinetic_energy", "world_force"]
-
-
 _REST_SPEED = 1e-4  # of √(g · width), the speed of a fall over a disk's own width: below it the disk rests
 _STEADY = 1e-9  # relative change of the loads in a step below which they are steady
 

@@ -23,9 +23,6 @@ from mechanics.planar.delassus import PlanarDelassus
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.laws.law import Terms
 
-__all__ = ["Apart", "Overlaps", "refuse_deep"]
-
-
 # overlap over the largest allowed that a correction leaves, a in the equations: contacts stay closed [-]
 _REMAINING_OVERLAP = 0.5
 # overlap beyond that from which disks are moved apart, over the largest allowed; the rest is for what is not linear

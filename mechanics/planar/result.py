@@ -10,8 +10,6 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.planar.scene import PlanarScene
 from mechanics.results.result import Errors, StepHistory
 
-__all__ = ["PlanarContactResult", "PlanarFrame", "PlanarHistory", "PlanarInstant", "PlanarResult"]
-
 
 @dataclass(frozen=True)
 class PlanarContactResult:

@@ -30,8 +30,6 @@ from mechanics.results.log import StepLog
 from mechanics.scene.laws.status import contact_status
 from mechanics.solvers.chain import Solver
 
-__all__ = ["PlanarRun"]
-
 
 class PlanarRun(SteppedRun):
     """A run in progress.

@@ -14,8 +14,6 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import LawRule, Method, SolverSettings
 from mechanics.stones.settings import check_settings
 
-__all__ = ["Disk", "PlanarScene", "PlanarTime", "Wall"]
-
 
 @dataclass(frozen=True)
 class Disk:

@@ -12,8 +12,6 @@ from mechanics.planar.result import PlanarFrame, PlanarInstant, PlanarResult
 from mechanics.planar.run import PlanarRun
 from mechanics.planar.scene import PlanarScene
 
-__all__ = ["PlanarObserver", "simulate_planar"]
-
 
 @dataclass(frozen=True)
 class PlanarObserver:

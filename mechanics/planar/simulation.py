@@ -20,9 +20,6 @@ from mechanics.solvers.chain import Solver
 from mechanics.solvers.choice import choose_planar_solver
 from mechanics.solvers.first_order.disk_admm import DiskADMM
 
-__all__ = ["PlanarSimulation", "PlanarStep"]
-
-
 # η of the forces at rest with which a run may begin
 _AT_REST = 1e-7
 # penalty of the ADMM that finds them: that for disks that settle [-]

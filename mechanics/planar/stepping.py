@@ -16,8 +16,6 @@ from mechanics.arrays import Array, Ints
 from mechanics.planar.model import PlanarModel, PlanarState
 from mechanics.scene.loads.load import Motion
 
-__all__ = ["Drive", "fly", "load_velocity", "load_work", "space"]
-
 
 class Drive:
     """The imposed motions of a scene.

@@ -6,17 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = [
-    "Laws",
-    "LocalCompliance",
-    "local_factors",
-    "natural_errors",
-    "onto_cone",
-    "plane_axes",
-    "slip",
-    "solve_contact",
-]
-
 
 class Laws(NamedTuple):
     """Laws of all contacts, as Gauss–Seidel sweeps need them.

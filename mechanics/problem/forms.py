@@ -10,8 +10,6 @@ from scipy.sparse.linalg import splu
 from ground.errors import SolverError
 from mechanics.arrays import Array
 
-__all__ = ["Form", "ScaledForm", "SparseForm", "block_diagonal"]
-
 
 class Form(Protocol):
     """W in a form that can be factorised.

@@ -17,18 +17,6 @@ from mechanics.arrays import Array, Ints
 from mechanics.problem.forms import Form, ScaledForm
 from mechanics.problem.validation import check_problem
 
-__all__ = [
-    "ContactProblem",
-    "ContactSolution",
-    "ContactStart",
-    "Delassus",
-    "GaussSeidel",
-    "PlaneContacts",
-    "RigidContacts",
-    "ScaledDelassus",
-    "mean_diagonal",
-]
-
 
 class GaussSeidel(Protocol):
     """Passes of non-smooth Gauss–Seidel on one problem."""

@@ -8,9 +8,6 @@ from mechanics.arrays import Array
 from mechanics.problem._kernels import natural_errors
 from mechanics.problem.problem import ContactProblem
 
-__all__ = ["Residual", "natural_map", "project_on_cone", "residual"]
-
-
 # smallest impulse that counts, over the one that would stop the fastest contact [-]
 _NOTHING = 1e-8
 _EPSILON = float(np.finfo(float).eps)

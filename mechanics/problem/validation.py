@@ -8,9 +8,6 @@ from ground.errors import SolverError
 from mechanics.arrays import Array
 from mechanics.stones.validation import LARGEST, SMALLEST
 
-__all__ = ["check_compliance", "check_problem", "require_finite"]
-
-
 _WHERE = "contact problem"
 _UNITS = "take units in which they are nearer to 1"
 

@@ -7,8 +7,6 @@ from numba import njit
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = ["Faces", "StartCorners", "facing", "joint_motion", "keep_largest", "patch_pressures"]
-
 _ONE_PLANE = 0.999  # cosine of the angle between two contacts of one joint [-]
 
 

@@ -7,9 +7,6 @@ from numpy.typing import NDArray
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = ["ContactResult", "JointResult"]
-
-
 _LIMIT_ROUNDING = 1e-9  # by which rounding may take a number beyond its limit of 1 [-]
 
 

@@ -14,8 +14,6 @@ from mechanics.model.model import Model
 from mechanics.results._kernels import Faces, facing
 from mechanics.scene.state import State
 
-__all__ = ["Interfaces", "find_interfaces", "placed_faces"]
-
 _HINGED = float(
     np.cos(np.radians(45.0))
 )  # cosine of the angle to which a joint of the start may open on its edge

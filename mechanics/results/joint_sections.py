@@ -18,9 +18,6 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.results._kernels import Faces
 from mechanics.stones.convex_polygons import following, moments, overlaps
 
-__all__ = ["JointPolygons", "eccentricity", "sections"]
-
-
 _THIN = 1e-6  # least overlap of the faces of a joint, over the area of the smaller one [-]
 
 

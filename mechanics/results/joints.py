@@ -16,17 +16,6 @@ from mechanics.results.joint_sections import JointPolygons, eccentricity, sectio
 from mechanics.results.patch_pressure import patch_pressure
 from mechanics.scene.state import State
 
-__all__ = [
-    "SLIVER",
-    "StartingJoints",
-    "joint_corners",
-    "joint_results",
-    "largest_faces",
-    "parting",
-    "resultants",
-    "starting_joints",
-]
-
 SLIVER = 5e-3
 """Area of a joint over the smaller of the largest faces of its two stones, up to which it is a sliver [-].
 

@@ -11,7 +11,7 @@ from mechanics.carried import Carried, Carrier, Rows
 from mechanics.dynamics.energy_balance import EnergyBalance, EnergyTerms
 from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.dynamics.observers.equilibrium import settlement, speed, support_reaction
-from mechanics.dynamics.outcome import StaticStart
+from mechanics.dynamics.outcome import Outcome, StaticStart
 from mechanics.dynamics.progress import Clock
 from mechanics.dynamics.step import Step
 from mechanics.dynamics.verdicts.lasting import LASTING, balance_of
@@ -19,12 +19,10 @@ from mechanics.dynamics.verdicts.watch import Verdict
 from mechanics.model.model import Model
 from mechanics.results.peaks import PeakTracker
 from mechanics.results.postprocess import Observer
-from mechanics.results.result import Energies, Errors, Frame, Outcome, Result, RunHistory, StepHistory
+from mechanics.results.result import Energies, Errors, Frame, Result, RunHistory, StepHistory
 from mechanics.results.stages import StageResult
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
-
-__all__ = ["Log", "StepLog", "result_of", "stage_result"]
 
 _COUNTS = ("iterations", "contacts")
 F = TypeVar("F")

@@ -9,9 +9,6 @@ from scipy.spatial import cKDTree
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["REACH", "patch_pressure"]
-
-
 REACH = 1.5
 """Radius of a patch over the mean distance of the contact points of a joint [-]."""
 

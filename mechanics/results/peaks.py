@@ -19,8 +19,6 @@ from mechanics.results.series import Recorder
 from mechanics.scene.state import State
 from mechanics.stones.elasticity.tensors import principal, von_mises
 
-__all__ = ["PeakTracker"]
-
 
 class PeakTracker(Carrier):
     """Largest values so far, and the time series of chosen stones.

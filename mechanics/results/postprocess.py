@@ -26,9 +26,6 @@ from mechanics.stones.elasticity.tensors import from_voigt, principal, to_voigt,
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 
-__all__ = ["Observer", "positions", "surface_polygons", "velocities"]
-
-
 # polygons that divide a facet, with all its nodes as corners, counter-clockwise seen from outside
 _FACET_PARTS: Mapping[Element, tuple[tuple[int, ...], ...]] = {
     Element.TET4: ((0, 1, 2),),

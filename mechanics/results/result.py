@@ -12,23 +12,6 @@ from mechanics.results.stress_values import StressValues
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.elements import Element
 
-__all__ = [
-    "BodyResult",
-    "Energies",
-    "Errors",
-    "Frame",
-    "JointSeries",
-    "Largest",
-    "Outcome",
-    "Peak",
-    "Peaks",
-    "Result",
-    "RunHistory",
-    "Series",
-    "StaticStart",
-    "StepHistory",
-]
-
 
 @dataclass(frozen=True)
 class Errors:

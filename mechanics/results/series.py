@@ -12,8 +12,6 @@ from mechanics.results.joints import StartingJoints
 from mechanics.results.result import JointSeries, Series
 from mechanics.scene.state import State
 
-__all__ = ["Recorder"]
-
 
 class Recorder(Carrier):
     """Motion of the stones of `Scene.series`, and what the joints of the start between two of them carry.

@@ -11,9 +11,6 @@ from mechanics.arrays import Array, Bools
 from mechanics.stones.elasticity.tensors import principal, von_mises
 from mechanics.stones.materials import Material
 
-__all__ = ["StressValues", "stress_values", "utilisation", "volume_quantile"]
-
-
 _NO_TENSION = (
     1e-3  # of a stone's root mean square stress [-]: tension below it is rounding of forces and stresses
 )

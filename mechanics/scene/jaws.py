@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.scene.loads.load import Pose
 
-__all__ = ["JawPath"]
-
 
 class JawPath:
     """Motion of jaws to given displacements in turn, at a constant speed; they rise with what they push.

@@ -25,8 +25,6 @@ from mechanics.stones.materials import Material
 from mechanics.stones.polyhedra import mass_properties
 from mechanics.stones.settings import check_settings
 
-__all__ = ["BASE", "BEAM", "HOLD", "JAWS", "Head", "Rig", "rigged"]
-
 BASE, BEAM, HOLD, JAWS = "rig base", "rig beam", "rig hold", ("rig jaw 1", "rig jaw 2")
 """Codes of the pieces."""
 

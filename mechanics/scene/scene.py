@@ -19,23 +19,6 @@ from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.settings import check_settings
 from mechanics.stones.validation import check_corners, finite, refuse_unless
 
-__all__ = [
-    "Block",
-    "ContactSettings",
-    "ContactSize",
-    "Fidelity",
-    "Growth",
-    "LawRule",
-    "Method",
-    "Part",
-    "Placement",
-    "Scene",
-    "SolverSettings",
-    "Start",
-    "TimeSettings",
-]
-
-
 ContactSize = Annotated[
     float | None,
     Setting(

@@ -16,22 +16,6 @@ from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, Part
 from mechanics.stones.materials import Material
 
-__all__ = [
-    "BOX_FACES",
-    "LIMESTONE",
-    "bond",
-    "box",
-    "box_corners",
-    "column",
-    "drum",
-    "prism",
-    "semicircular_arch",
-    "voussoir",
-    "voussoir_arch",
-    "wall",
-    "wedge",
-]
-
 Point = tuple[float, float]
 Polygon = Sequence[Sequence[float]] | Array
 

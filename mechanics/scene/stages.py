@@ -7,8 +7,6 @@ from ground.errors import SceneError
 from mechanics.scene.loads.load import Loads
 from mechanics.scene.scene import Block, Fidelity, Scene
 
-__all__ = ["Stage", "check_stages", "whole_scene"]
-
 
 @dataclass(frozen=True)
 class Stage:

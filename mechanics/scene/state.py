@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from mechanics.arrays import Array
 
-__all__ = ["State"]
-
 
 @dataclass(frozen=True)
 class State:

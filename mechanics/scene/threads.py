@@ -5,8 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
 
-__all__ = ["at_once"]
-
 _pool = lru_cache(ThreadPoolExecutor)
 
 

@@ -9,8 +9,6 @@ from mechanics.problem.residual import residual
 from mechanics.solvers.chain import KEPT, follow
 from mechanics.solvers.kinds import EXACT, FURTHER, POLISH, chain_of
 
-__all__ = ["Auto"]
-
 # steps without slip after which chains of rest are tried again; where they fail, they cost as much as one step
 _MOTION = 40
 # loosest tolerance of η and of velocities in a motion, and largest velocity of a contact at rest over the largest

@@ -16,8 +16,6 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.problem.residual import residual
 from mechanics.solvers.self_stress import without_self_stress
 
-__all__ = ["KEPT", "Begin", "Chain", "Link", "Solver", "follow"]
-
 KEPT = "forces of the last step"
 """Reason of a solution that no method had to find."""
 

@@ -17,9 +17,6 @@ from mechanics.solvers.kinds import ENDED_PATH
 from mechanics.solvers.scales import PLAIN_LOOK
 from mechanics.solvers.second_order.newton import Newton
 
-__all__ = ["choose_planar_solver", "choose_solver"]
-
-
 # largest error of a motion over the sum of the largest velocity errors of its steps: contacts may all err one way [-]
 _ADDS_UP = 8.0
 

@@ -15,8 +15,6 @@ from mechanics.solvers.kinds import SOME, moving_bodies
 from mechanics.solvers.scales import FOLLOWING, JOINTS
 from mechanics.solvers.second_order.newton import Newton
 
-__all__ = ["rests_from_nothing"]
-
 # velocity with the harder joints over that with the softer ones, a hundredth of the compliance apart, below which it
 # vanishes with them; and velocity over the largest u_free above which stones fall [-]
 _SMALL = 0.1

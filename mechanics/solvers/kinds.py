@@ -20,8 +20,6 @@ from mechanics.solvers.second_order.interior_point import InteriorPoint
 from mechanics.solvers.second_order.newton import Newton
 from mechanics.solvers.second_order.softer_joints import SofterJoints
 
-__all__ = ["ENDED_PATH", "EXACT", "FURTHER", "POLISH", "SOME", "chain_of", "moving_bodies", "standing_chain"]
-
 # budgets of links that others follow; what needs more is mostly solved by none of them
 _ADMM = 500  # iterations of ADMM, and sweeps over disks
 # the same from nothing: up to 2 % above a limit load the motion takes 500 to 1,000 iterations, and with fewer it is the

@@ -1,18 +1,5 @@
 """Numbers that several methods share."""
 
-__all__ = [
-    "CORRECTIONS",
-    "FOLLOWING",
-    "HELD",
-    "JOINTS",
-    "LOOK",
-    "MANY",
-    "OVERSHOOT",
-    "PLAIN_LOOK",
-    "ROUNDING",
-    "SPARE",
-]
-
 ROUNDING = 1e-9
 """Part of a quantity that counts as nothing: below it, rounding and the methods' own errors decide [-]."""
 

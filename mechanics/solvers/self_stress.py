@@ -8,8 +8,6 @@ from mechanics.problem.residual import project_on_cone
 from mechanics.solvers.scales import CORRECTIONS, ROUNDING
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["without_self_stress"]
-
 
 def without_self_stress(problem: ContactProblem, impulse: Array) -> Array:
     """Return the smallest impulses (nc, d) that load the bodies alike, projected on the cones.

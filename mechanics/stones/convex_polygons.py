@@ -7,8 +7,6 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = ["following", "moments", "overlaps"]
-
 
 def following(count: Ints, most: int) -> Ints:
     """Return the corner after each one (n, most), for polygons with `count` (n,) corners."""

@@ -12,9 +12,6 @@ from mechanics.arrays import Array
 from mechanics.stones.settings import check_settings
 from mechanics.stones.validation import LARGEST
 
-__all__ = ["Material", "Orthotropy", "fourth_order"]
-
-
 # tensor components of the six stresses and strains, in the order xx, yy, zz, xy, yz, zx
 _FIRST, _SECOND = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
 Triple = tuple[float, float, float]

@@ -8,20 +8,6 @@ import numpy as np
 from ground.errors import GeometryError
 from mechanics.arrays import Array, Ints
 
-__all__ = [
-    "MassProperties",
-    "alike",
-    "face_plane",
-    "face_planes",
-    "face_planes_alike",
-    "fan",
-    "mass_properties",
-    "mass_properties_alike",
-    "smallest_width",
-    "smallest_widths",
-    "united",
-]
-
 Faces = Sequence[Sequence[int]]
 Polygons = tuple[tuple[int, ...], ...]
 

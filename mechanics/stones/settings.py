@@ -7,8 +7,6 @@ from ground.errors import SceneError
 from ground.settings import Setting, declared
 from mechanics.stones.validation import LARGEST, SMALLEST
 
-__all__ = ["check_settings"]
-
 
 def check_settings(where: str, settings: object) -> None:
     """Refuse the first number outside its declared bounds; None, where a field allows it, is always within them.

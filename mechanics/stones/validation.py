@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike
 from ground.errors import SceneError
 from mechanics.arrays import Array
 
-__all__ = ["LARGEST", "SMALLEST", "Rule", "check_corners", "finite", "refuse_unless"]
-
 # numbers between these bounds, and their quotients, can still be squared and added
 LARGEST = 1e75
 SMALLEST = 1e-75

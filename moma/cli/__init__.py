@@ -18,8 +18,6 @@ from moma.cli.runs import report, runs
 from moma.cli.scenes import check, run, trade, warm_up
 from moma.cli.surveys import cloud, ingest, orient, sample, survey_report
 
-__all__ = ["app", "main"]
-
 app = typer.Typer(
     cls=PlainGroup,
     name="moma",

@@ -23,8 +23,6 @@ from moma.cli.options import (
 )
 from moma.cli.progress import progress_bars
 
-__all__ = ["assess", "compare", "diagnose", "pushover", "study"]
-
 
 @contextmanager
 def _going_on(folder: Path) -> Iterator[None]:

@@ -20,8 +20,6 @@ from typer.core import HAS_RICH, TyperCommand, TyperGroup
 
 from ground.errors import MomaError, missing_library, storage_error
 
-__all__ = ["PlainCommand", "PlainGroup", "open_streams", "reporting", "say", "short_lived"]
-
 _CLOSEST = "moma.closest"  # name of the error handler
 # what decomposes into no ASCII
 _ASCII = str.maketrans({

@@ -21,8 +21,6 @@ from moma.cli.options import (
 )
 from moma.cli.surveys import sources
 
-__all__ = ["ElevationChoices", "ServerChoices", "export", "import_", "migrate", "serve", "view"]
-
 
 @reporting
 def migrate(

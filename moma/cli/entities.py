@@ -9,8 +9,6 @@ from ground.errors import UsageError
 from moma.cli.console import reporting, say, short_lived
 from moma.cli.options import DEFAULT_DB, At, Common, Json, ListFormat, Verbose
 
-__all__ = ["query", "schema", "show"]
-
 RunNumber = Annotated[
     int | None,
     typer.Option("--run", metavar="N", help="Run whose results are shown; default: each stone's latest."),

@@ -10,8 +10,6 @@ from moma.cli.console import reporting, say
 from moma.cli.options import Json, Out, Overwrite, Resume, SceneArgument, StoreDb
 from moma.cli.progress import Interruption, progress_bars
 
-__all__ = ["ExperimentName", "geology"]
-
 
 class ExperimentName(StrEnum):
     """Experiments with disks."""

@@ -9,8 +9,6 @@ import typer
 from moma.cli.console import reporting
 from moma.cli.options import At, Common, Sheet
 
-__all__ = ["TableChoices", "entries", "matrix", "record"]
-
 
 @reporting
 def entries(common: Common) -> None:

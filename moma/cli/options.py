@@ -9,32 +9,6 @@ import typer
 
 from ground.errors import UsageError
 
-__all__ = [
-    "DEFAULT_DB",
-    "AcceptUnsound",
-    "At",
-    "CloudChoices",
-    "Common",
-    "Db",
-    "DrawnChoices",
-    "Json",
-    "ListFormat",
-    "Out",
-    "Overwrite",
-    "Profile",
-    "ProfileName",
-    "Resume",
-    "SceneArgument",
-    "Sheet",
-    "SolidChoices",
-    "StoreDb",
-    "SurveyChoices",
-    "SurveyFormat",
-    "UpAxis",
-    "Verbose",
-    "check_ending",
-]
-
 DEFAULT_DB = "sqlite:///moma.db"
 
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from mechanics.dynamics.progress import Listener
     from mechanics.dynamics.progress import Progress as Report
 
-__all__ = ["Interruption", "progress_bars"]
-
 _FIRST = 1.0  # time after which the first plain line appears: shorter commands need none [s]
 _EVERY = 5.0  # interval between plain lines [s]
 _MEASURED = 1.0  # time of a stage from which its rate is trusted [s]

@@ -16,8 +16,6 @@ from moma.cli.progress import progress_bars
 if TYPE_CHECKING:
     from pipelines.propose.propose import ProposalReport
 
-__all__ = ["CoreShape", "MasonryKind", "Subject", "outlines", "propose"]
-
 
 class Subject(StrEnum):
     """Subjects of proposals."""

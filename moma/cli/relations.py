@@ -11,8 +11,6 @@ from moma.cli.options import At, Common
 if TYPE_CHECKING:
     from pipelines.ingest.relate import RelationReport
 
-__all__ = ["load_path", "relate"]
-
 
 @reporting
 def relate(
@@ -75,7 +73,7 @@ def load_path(
     """Show all stones that carry a stone, directly or through others; with --up, all that it carries."""
     from archmodel.database.as_known import as_known, entry_named
     from archmodel.database.session import open_database
-    from archmodel.relations.graph import load_path as follow
+    from archmodel.relations.load_paths import load_path as follow
     from moma.cli.text.formats import as_json, as_table, some
 
     with open_database(common.db, create=False) as database, database.session(read_only=True) as session:

@@ -11,8 +11,6 @@ from ground.errors import UsageError
 from moma.cli.console import reporting, say
 from moma.cli.options import Common, Json, Verbose, check_ending
 
-__all__ = ["report", "runs"]
-
 _LIST = (
     "run",
     "scene",

@@ -19,8 +19,6 @@ from moma.cli.options import (
 )
 from moma.cli.progress import Interruption, progress_bars
 
-__all__ = ["check", "run", "trade", "warm_up"]
-
 
 @reporting
 def check(

@@ -26,19 +26,6 @@ from moma.cli.progress import progress_bars
 if TYPE_CHECKING:
     from survey.formats.options import ReadingOptions
 
-__all__ = [
-    "Blunders",
-    "Level",
-    "MasonryChoices",
-    "Moved",
-    "cloud",
-    "ingest",
-    "orient",
-    "sample",
-    "sources",
-    "survey_report",
-]
-
 
 class Level(StrEnum):
     """Grades of what a survey does not tell about masonry."""

@@ -32,19 +32,6 @@ from pipelines.assess.questions import LoadQuestion, Question, Thickness, Thrust
 from pipelines.assess.sensitivity import sensitivity
 from pipelines.scene.site import Site
 
-__all__ = [
-    "FALLS",
-    "NOT_DECIDED",
-    "Answer",
-    "Confirm",
-    "Lead",
-    "answer",
-    "confirmer",
-    "fallen",
-    "leader",
-    "refuse_unanswerable",
-]
-
 FALLS = "falls under its own weight"
 """Outcome of what does not stand at all."""
 

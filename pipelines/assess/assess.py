@@ -54,8 +54,6 @@ from pipelines.scene.selection import select_groups, select_stones
 from pipelines.scene.site import Site
 from pipelines.scene.stages import refuse_stages
 
-__all__ = ["CURVE_COLUMNS", "INDEX", "JOINT_COLUMNS", "REPORT", "AssessOptions", "Assessment", "assess"]
-
 INDEX = "assessment.json"
 """Index of the results of an assessment."""
 

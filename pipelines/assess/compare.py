@@ -51,8 +51,6 @@ from survey.quality.movement import (
 )
 from survey.quality.precision import StoneQuality, appraise
 
-__all__ = ["INDEX", "SurveyComparison", "compare", "facades_of", "measured_stones"]
-
 INDEX = "comparison.json"
 """Index of the results of a comparison."""
 

@@ -11,8 +11,6 @@ from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.scene import Block, Fidelity
 from pipelines.assess.questions import LoadQuestion
 
-__all__ = ["facade_pushes", "push", "weakest_push"]
-
 _UPRIGHT = 0.3  # vertical part of the normal of an upright face, at most [-]
 _ALIKE = np.radians(5.0)  # angle within which faces belong to one façade [rad]
 _PUSH_SHARE = 0.25  # area of the upright faces that a façade has, those square to it included [-]

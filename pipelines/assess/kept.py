@@ -20,8 +20,6 @@ from pipelines.results.checkpoints import write_whole
 from pipelines.results.folder import locked
 from pipelines.run.record import versions
 
-__all__ = ["Kept", "kept_answers"]
-
 
 class Kept:
     """Answers in a folder.

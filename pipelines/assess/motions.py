@@ -8,8 +8,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.results.result import BodyResult
 
-__all__ = ["Motions", "stone_motions"]
-
 
 @dataclass(frozen=True)
 class Motions:

@@ -14,8 +14,6 @@ from pipelines.scene.array_tables import ArrayTable
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups
 
-__all__ = ["LoadQuestion", "Question", "Thickness", "ThrustQuestion", "parse_question", "scene_questions"]
-
 Vector = tuple[float, float, float]
 
 

@@ -23,8 +23,6 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad
 from mechanics.limit.live_loads import Acceleration
 
-__all__ = ["Sensitivity", "sensitivity"]
-
 
 @dataclass(frozen=True)
 class Sensitivity:

@@ -10,8 +10,6 @@ from pipelines.draw.offscreen.animation import MovingSurface
 from pipelines.draw.offscreen.surfaces import support_motion, wall_surface
 from pipelines.draw.pictures import draw_apart
 
-__all__ = ["MOTION", "draw_motion"]
-
 MOTION = "motion.gif"
 """Name of the file."""
 

@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["PICTURES", "Picture"]
-
 UnitOf = Callable[[float], tuple[float, str]]
 """Factor and unit by the end of a scale."""
 

@@ -18,9 +18,6 @@ from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 from survey.quality.facades import Facade, find_facades
 
-__all__ = ["closing_surface", "draw_closing", "draw_elevations", "draw_in_space", "flat_facades", "viewpoint"]
-
-
 _FLAT = 0.2  # largest depth of a facade over its extent [-]: a deeper one is distorted by an elevation
 _LOOKING = np.cos(np.radians(25.0))  # smallest mean component of the normals across the facade [-]
 _SHARE = 0.08  # smallest share of the visible area [-]: smaller facades are not worth an elevation

@@ -19,8 +19,6 @@ from survey.clouds.views.orthophoto import STEP, Picture, find_wall, paint_wall,
 from survey.clouds.views.sections import Section, SectionPlane, contour, section_plane
 from survey.clouds.wall import read_wall, wall_lines
 
-__all__ = ["INDEX", "DrawnCloud", "DrawnSection", "draw_views"]
-
 INDEX = "cloud.json"
 """Name of the file that lists all files of the folder."""
 

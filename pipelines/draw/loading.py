@@ -12,8 +12,6 @@ from mechanics.limit.loading_test import LoadingTest
 from mechanics.results.postprocess import positions
 from pipelines.draw.elevations.sheet import new_sheet
 
-__all__ = ["draw_curve", "draw_pushed"]
-
 _ROW = 80  # characters in a line of a title
 _DRAWN_DISPLACEMENT = 0.08  # way of the push in the picture over the extent of the stones [-]
 _OPEN = 0.05  # opening of a joint that is marked, over the displacement of the push [-]

@@ -16,8 +16,6 @@ from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 
-__all__ = ["draw_mechanisms"]
-
 _DRAWN_DISPLACEMENT = 0.06  # of the fastest corner over the extent of the scene [-]
 
 

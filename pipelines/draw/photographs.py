@@ -15,8 +15,6 @@ from survey.orientation.projection import project
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["DrawnOutline", "draw_network", "draw_outlines", "draw_photo_residuals"]
-
 _RAYS = 4000  # rays drawn in the plan
 _ELLIPSES = 400  # ellipses drawn in the plan
 _NAMED = 40  # photographs named in the plan

@@ -15,8 +15,9 @@ import numpy as np
 from archmodel.store.run_record import without_rounding
 from ground.errors import MissingLibraryError, missing_library
 from mechanics.arrays import Array
+from mechanics.dynamics.outcome import Outcome
 from mechanics.results.contact_result import JointResult
-from mechanics.results.result import BodyResult, Outcome, Result
+from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import volume_quantile
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
@@ -25,8 +26,6 @@ from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, support_motion, wall_surface
 from pipelines.results.peaks import peak_records
 from pipelines.results.summary import length_tolerance
-
-__all__ = ["OF_RESULTS", "draw_apart", "draw_pictures", "drawing_process", "missing", "package_of"]
 
 OF_RESULTS = "pipelines.draw.offscreen.result"
 """Module that draws the pictures of a result."""

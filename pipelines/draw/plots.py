@@ -11,8 +11,6 @@ from mechanics.arrays import Array
 from mechanics.results.result import RunHistory
 from pipelines.draw.elevations.sheet import new_sheet
 
-__all__ = ["draw_capacity", "history_svg"]
-
 if TYPE_CHECKING:
     from mechanics.limit.pushover import Pushover
 

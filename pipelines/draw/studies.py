@@ -9,8 +9,6 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import new_sheet
 
-__all__ = ["draw_fragility", "draw_samples", "draw_shares", "draw_tornado", "draw_weighted"]
-
 _BLUE, _RED, _GREY = "#1f5f8b", "#8a3b12", "#b0b0b0"
 _MAX_BARS = 15  # bars of a tornado
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_course", "draw_curves", "draw_instant", "draw_shapes", "draw_trishear"]
-
 _WIDE = 10.0  # of a figure [inch]
 _ROW = 130  # characters in a line of a footnote
 _LAYERS = (

@@ -8,6 +8,7 @@ from typing import Annotated, Any, cast
 import numpy as np
 
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.planar.measures.cells import Cell
 from mechanics.scene.loads.motions import ImposedMotion
 from pipelines.geology.experiments.biaxial import Biaxial
@@ -19,11 +20,9 @@ from pipelines.geology.experiments.repose import Repose
 from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.observe import WHOLE
 from pipelines.geology.settings import DiskContact, GeologyOutput, Layer, SampleSettings, Stepping, Sweeping
-from pipelines.toml.keys import Numbers, Setting, build, keys_of, read_table
+from pipelines.toml.keys import Numbers, build, keys_of, read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import TomlDocument, check_table, nearest, tables_of
-
-__all__ = ["EXPERIMENTS", "GeologyScene", "parse_geology", "read_geology"]
 
 EXPERIMENTS: Mapping[str, type[Any]] = {
     "deposit": Deposition,

@@ -16,8 +16,6 @@ from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.tessellation import Tessellation, tessellation
 from mechanics.planar.result import PlanarInstant
 
-__all__ = ["CELL_COLUMNS", "WHOLE", "Fields", "Instants", "ObservedRun", "read_rows"]
-
 _EXPERIMENT = "experiment.csv"  # rows of what an experiment observes
 WHOLE = "whole sample"
 """Name of the rows of all disks."""

@@ -12,8 +12,6 @@ from pipelines.geology.observe import CELL_COLUMNS, Fields
 from pipelines.geology.sample import PreparedSample
 from pipelines.results.vtu import LINE, POLYGON, VERTEX, UnstructuredGrid, cells_of, write_pvd, write_vtu
 
-__all__ = ["write_series"]
-
 _UNITS = {
     "radius": "m",
     "velocity": "m/s",

@@ -12,8 +12,6 @@ from pipelines.geology.file import GeologyScene
 from pipelines.reports.html import kilopascals, percent, picture, ratio, scientific, write_page
 from pipelines.reports.page.model import Model
 
-__all__ = ["write_report"]
-
 _CAPTIONS = {
     "layers": "Marker layers, which were level at the start, and the disks of the cells.",
     "velocity": "Velocities of some of the disks.",

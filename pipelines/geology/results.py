@@ -28,8 +28,6 @@ from pipelines.results.summary import as_json
 from pipelines.run.record import versions
 from pipelines.run.unfinished import UnfinishedRun
 
-__all__ = ["Observations", "quality_of", "write_results"]
-
 _MOST_OVERLAP = 0.01  # over the smallest radius, beyond which a run says so first [-]
 _FABRIC = ("anisotropy", "fabric_direction", "coordination", "porosity")  # columns of a cell
 _EXPERIMENT = "experiment.csv"  # rows of what the experiment observes

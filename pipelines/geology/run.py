@@ -35,8 +35,6 @@ from pipelines.run.planar import run_planar
 from pipelines.run.record import error_measures, store_record, versions
 from pipelines.run.unfinished import UnfinishedRun
 
-__all__ = ["GeologyReport", "planar_scene", "run_geology"]
-
 _ON_THE_FLOOR = 0.1  # gap over the smallest radius below which a disk stands on the floor [-]
 _START = 2000  # iterations of ADMM, at most, that find the forces of the sample at rest
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results

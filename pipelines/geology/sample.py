@@ -13,8 +13,6 @@ from mechanics.dynamics.progress import Listener, silent
 from mechanics.planar.deposit import Deposit, deposit
 from pipelines.geology.file import GeologyScene
 
-__all__ = ["PreparedSample", "prepare"]
-
 _VERSION = 4  # of the preparation: a change of its outcome raises it
 _DIGITS = 16  # of the digest that names a sample
 

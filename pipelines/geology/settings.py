@@ -6,8 +6,6 @@ from typing import Annotated
 from ground.errors import SceneError
 from ground.settings import Setting
 
-__all__ = ["DiskContact", "GeologyOutput", "Layer", "SampleSettings", "Stepping", "Sweeping"]
-
 
 @dataclass(frozen=True)
 class SampleSettings:

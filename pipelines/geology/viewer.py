@@ -9,8 +9,6 @@ from mechanics.planar.measures.cells import Cell, members
 from pipelines.geology.observe import Instants
 from pipelines.reports.page.model import Column, Lines, Model, Motion, Stones
 
-__all__ = ["disks_model"]
-
 _CORNERS = 12  # of a disk as drawn
 _MAX_VALUES = 600_000  # disks times instants in a page
 _CHAINS = 3000  # forces that are drawn at the end, the largest first

@@ -14,8 +14,6 @@ from archmodel.exchange.reader import import_building
 from archmodel.exchange.writer import export_building, write_building
 from ground.errors import DatabaseError, ExchangeError
 
-__all__ = ["ExchangeReport", "export_database", "export_to_stream", "import_database"]
-
 
 @dataclass(frozen=True)
 class ExchangeReport:

@@ -34,13 +34,10 @@ from pipelines.ingest.relate import KnownSolids, relate
 from pipelines.ingest.report import IngestReport, Tally
 from pipelines.ingest.spool import Spool
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.formats.reading import ReadingOptions
+from survey.formats.options import ReadingOptions
 from survey.formats.tables.axes import exchanged, exchanged_station
 from survey.records.survey import Reject
 from survey.registration.stones import survey_stones
-
-__all__ = ["ingest"]
-
 
 _PATIENCE = (
     300.0  # longest wait for another writer [s]; waiting for a large survey is cheaper than fitting again

@@ -32,8 +32,6 @@ from ground.errors import UsageError
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import area_vector
 
-__all__ = ["RULE_ATTRIBUTES", "KindRule", "apply_rules", "check_kinds", "kind_rules"]
-
 Value = float | str | None
 
 RULE_ATTRIBUTES: Mapping[str, str] = {

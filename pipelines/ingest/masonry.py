@@ -11,8 +11,6 @@ from archmodel.store.stone_arrays import ENTITY, StoneFace, id_conditions, stone
 from survey.quality.facades import find_facades
 from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
 
-__all__ = ["masonry_values"]
-
 
 def masonry_values(
     session: Session, among: Collection[int] | None = None

@@ -18,18 +18,6 @@ from survey.formats.reading import open_survey
 from survey.records.review import Doubtful
 from survey.records.survey import Reject, SurveyStream
 
-__all__ = [
-    "check_outline_rejects",
-    "cloud_options",
-    "mask_options",
-    "open_source",
-    "outline_rejects",
-    "outline_rejects_path",
-    "read_files",
-    "size_of",
-    "write_review",
-]
-
 _MARK = b"outlines rejected by moma"
 _SIZE = re.compile(r"(\d+(?:[.,]\d+)?)\s*[x×]\s*(\d+(?:[.,]\d+)?)")
 _LARGEST = 1000.0  # size of a wall [m]

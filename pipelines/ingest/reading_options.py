@@ -6,12 +6,11 @@ from pathlib import Path
 
 from ground.errors import UsageError
 from ground.tables.columns import UNITS, length_unit
+from survey.formats.native.reader import with_header
 from survey.formats.options import ReadingOptions
-from survey.formats.reading import ENDINGS, format_of, solid_files, with_header
+from survey.formats.reading import ENDINGS, format_of, solid_files
 from survey.formats.tables.kinds import read_kinds
 from survey.formats.tables.roles import read_roles
-
-__all__ = ["UNITS", "Source", "format_of_all", "reading_options", "solid_options", "survey_sources"]
 
 _ENDINGS: Mapping[str, tuple[str, ...]] = {
     **ENDINGS,

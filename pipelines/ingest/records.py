@@ -19,9 +19,6 @@ from survey.geometry.solids import Solid
 from survey.records.survey import BlockRecord, Extrusion
 from survey.registration.site_frame import SiteTransform
 
-__all__ = ["frame_record", "stone_record", "surveyed_block"]
-
-
 _STONE = ("code", "kind", "course")
 # measured in the one, resolved for every stone in the other
 _DEPTH = ("depth", "depth_sigma", "depth_source", "depth_origin")

@@ -17,8 +17,6 @@ from ground.tables.text_lines import TextLines
 from survey.formats.reading import ENDINGS, SOLIDS
 from survey.records.survey import Reject
 
-__all__ = ["MARK", "check_targets", "default_path", "rejects_text"]
-
 MARK = b"# rejected by moma"
 """First or second line of the files, by which they are recognised."""
 

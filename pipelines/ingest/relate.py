@@ -33,8 +33,6 @@ from mechanics.arrays import Array, Ints
 from pipelines.ingest.masonry import masonry_values
 from survey.geometry.adjacency import PolyhedraBuilder, SolidArrays, find_touching
 
-__all__ = ["KnownSolids", "RelationReport", "relate"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 

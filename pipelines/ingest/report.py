@@ -19,9 +19,6 @@ from survey.records.snapping import Snapping
 from survey.records.survey import Reject
 from survey.registration.stones import SurveyedStream
 
-__all__ = ["FileReport", "IngestReport", "Question", "Refusal", "SolidsReport", "Tally"]
-
-
 _LEAST_DECIMALS = 3  # of rounded coordinates [m]; with fewer they are whole centimetres by design
 _MOST_DECIMALS = 6  # of rounded coordinates [m]; with more they are not rounded
 

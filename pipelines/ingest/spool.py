@@ -18,8 +18,6 @@ from archmodel.store.stone_record import StoneRecord
 from ground.errors import SurveyError
 from mechanics.arrays import Array
 
-__all__ = ["Spool"]
-
 _BATCH = 200
 """Number of stones written at once, so that common values are pickled once."""
 

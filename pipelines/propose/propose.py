@@ -30,16 +30,6 @@ from survey.unseen.core.settings import InfillSettings
 from survey.unseen.missing.propose import propose_missing
 from survey.unseen.missing.settings import MissingSettings
 
-__all__ = [
-    "Facings",
-    "Proposal",
-    "ProposalReport",
-    "Recording",
-    "core_record",
-    "propose_core",
-    "propose_stones",
-]
-
 _MAX_DISTANCE = 1000.0  # distance of the viewpoint in front of the wall [m], large enough to see it squarely
 _PROPOSAL_DIFFERENCE = 1e-3  # largest difference of equal proposals, in position [m] and relative volume [-]
 

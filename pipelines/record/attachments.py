@@ -8,8 +8,6 @@ from pathlib import Path
 
 from pipelines.record.file import Table
 
-__all__ = ["Attachment", "attachment_of"]
-
 _LOCAL = re.compile(r"(?!\w+://).*\.[A-Za-z]\w{1,4}")
 """A place that ends as names of files do, and is no address: an archive's number is none."""
 

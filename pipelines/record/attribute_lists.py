@@ -48,8 +48,6 @@ from ground.errors import UsageError
 from ground.tables.columns import places_of, plain
 from ground.tables.table import read_table
 
-__all__ = ["COLUMNS", "AttributeList", "read_attribute_list", "record_attribute_list"]
-
 COLUMNS: Mapping[str, Sequence[str]] = {
     # English; German
     "code": (

@@ -17,8 +17,6 @@ from archmodel.tables.entries import Entry
 from ground.errors import UsageError
 from pipelines.ingest.records import stone_record, surveyed_block
 
-__all__ = ["record_depth"]
-
 
 def record_depth(
     session: Session,

@@ -21,8 +21,6 @@ from pipelines.record.keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
 from pipelines.toml.lines import Path, key_lines, parse_toml, read_text
 from pipelines.toml.schema import Key, TomlDocument, check_table, nearest, tables_of
 
-__all__ = ["RecordFile", "Table", "parse_record", "read_record"]
-
 
 @dataclass(frozen=True)
 class Table:

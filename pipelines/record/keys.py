@@ -9,10 +9,9 @@ from archmodel.tables.opinions import DISPUTABLE, RULES
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from archmodel.tables.terms import VOCABULARIES
-from pipelines.toml.keys import Setting, Stones, Table, Texts, Vector, Year, keys_of
+from ground.settings import Setting
+from pipelines.toml.keys import Stones, Table, Texts, Vector, Year, keys_of
 from pipelines.toml.schema import Key
-
-__all__ = ["ABOUT", "ARRAYS", "ATTRIBUTE", "CITED", "PROPERTY", "RECORD", "WHO", "WITHDRAWN"]
 
 WITHDRAWN = (
     "made_of", "of_phase", "decision", "mark", "observation", "reference", "note", "relation", "member", "material",

@@ -9,6 +9,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from archmodel.assertions.validation import checked_text
+from archmodel.skos.concepts import ENDINGS
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.store.stone_rows import storable
 from archmodel.tables.entries import Entry, new_entry
@@ -16,9 +17,7 @@ from ground.errors import UsageError
 from pipelines.record.attachments import Attachment
 from pipelines.record.attribute_lists import AttributeList, read_attribute_list, record_attribute_list
 from pipelines.record.relation_lists import RelationList, read_relation_list, record_relation_list
-from pipelines.record.term_lists import ENDINGS, TermList, read_term_list, record_term_list
-
-__all__ = ["LISTS", "FileRecorded", "ListFile", "read_list", "record_list", "recorded_before"]
+from pipelines.record.term_lists import TermList, read_term_list, record_term_list
 
 LISTS = (
     *(".csv", ".tsv", ".txt", ".xlsx", ".xls", ".xlsb", ".ods"),

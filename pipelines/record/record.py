@@ -21,8 +21,6 @@ from pipelines.record.file import RecordFile, Table, read_record
 from pipelines.record.lists import LISTS, FileRecorded, ListFile, read_list, record_list, recorded_before
 from pipelines.record.tables import STATED, record_table
 
-__all__ = ["RecordReport", "record"]
-
 _CORRECTIONS = ("correction", "depth")
 
 

@@ -27,8 +27,6 @@ from ground.errors import MomaError, SurveyError, UsageError
 from ground.tables.columns import plain, spellings
 from ground.tables.table import TableRow, read_table
 
-__all__ = ["RelationList", "read_relation_list", "record_relation_list", "relation_of"]
-
 _WORDS: Mapping[str, Sequence[str]] = {
     # English; German; Italian, as in the palette of the Extended Matrix
     "above": (

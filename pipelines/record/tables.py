@@ -59,8 +59,6 @@ from ground.errors import UsageError
 from pipelines.record.depth import record_depth
 from pipelines.record.file import RecordFile, Table
 
-__all__ = ["STATED", "record_table"]
-
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is a code
 
 STATED: Mapping[str, type[Statement]] = {

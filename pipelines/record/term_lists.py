@@ -10,13 +10,11 @@ from sqlalchemy.orm import Session
 
 from archmodel.assertions.terms import declare_term
 from archmodel.assertions.validation import checked_choice
-from archmodel.skos.concepts import ENDINGS, Concept, Scheme, read_scheme
+from archmodel.skos.concepts import Concept, Scheme, read_scheme
 from archmodel.store.revisions import NOTHING, RowCounts
 from archmodel.tables.entries import Entry, held_at
 from archmodel.tables.terms import VOCABULARIES, Term, Vocabulary, spelling_of, vocabulary
 from ground.errors import UsageError
-
-__all__ = ["ENDINGS", "TermList", "read_term_list", "record_term_list"]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ from pipelines.reports.html import direction_text, input_rows, kilonewtons, perc
 from pipelines.reports.page.model import Model
 from pipelines.results.wall_axes import WallAxes, axes_of
 
-__all__ = ["write_assessment"]
-
 _HEAD = (
     "Question",
     "Held or least",

@@ -17,24 +17,6 @@ from pipelines.reports.page.model import Model
 from pipelines.reports.page.paper import contents, sealed, title_block
 from pipelines.results.wall_axes import WallAxes
 
-__all__ = [
-    "Picture",
-    "direction_text",
-    "in_words",
-    "input_rows",
-    "kilonewtons",
-    "kilopascals",
-    "megapascals",
-    "millimetres",
-    "page_text",
-    "percent",
-    "picture",
-    "ratio",
-    "render",
-    "scientific",
-    "write_page",
-]
-
 Picture = dict[str, str]
 """Caption and base64 content of a PNG."""
 

@@ -8,8 +8,6 @@ from archmodel.quantities import quantities_of
 from pipelines.reports.html import in_words, input_rows, millimetres, picture, ratio, write_page
 from pipelines.reports.page.model import Model
 
-__all__ = ["unrested", "write_comparison", "write_diagnosis_page"]
-
 _RESTS = ("equilibrium", "settled")  # outcomes whose movement is over
 
 _BEDS = (

@@ -6,8 +6,6 @@ from typing import Any
 from archmodel.quantities import quantities_of
 from pipelines.reports.html import in_words
 
-__all__ = ["passed_peaks", "peak_rows", "peak_text"]
-
 _PASSED = 1.05  # peak over the value at the end, from which the end says too little [-]
 _NO_FORCE = 1e-3  # of the weight [-]: a smaller reaction is not worth a line
 

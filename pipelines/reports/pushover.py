@@ -7,8 +7,6 @@ from typing import Any
 from pipelines.reports.html import direction_text, input_rows, kilonewtons, picture, write_page
 from pipelines.results.wall_axes import axes_of
 
-__all__ = ["write_pushover"]
-
 _PICTURES = {
     "curve.png": "Force on the jaws of the rig against the displacement of the push.",
     "peak.png": "The stones at the largest force.",

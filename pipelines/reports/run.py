@@ -29,8 +29,6 @@ from pipelines.reports.html import (
 from pipelines.reports.page.model import Model
 from pipelines.reports.peaks import peak_rows
 
-__all__ = ["write_report"]
-
 _OUTCOMES = {
     "equilibrium": "It stands as surveyed: every stone is at rest, in balance.",
     "settled": "It does not stand as surveyed: every stone came to rest, in balance, but not all in their places.",

@@ -6,8 +6,6 @@ from typing import Any
 
 from pipelines.reports.html import percent, picture, write_page
 
-__all__ = ["write_study"]
-
 _CAPTIONS = {
     "histogram": "Samples of the quantity, and the share of them that is below each value.",
     "weighted": "Samples about the design points (grey), and the probability that they stand for (line).",

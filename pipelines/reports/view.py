@@ -27,16 +27,6 @@ from pipelines.reports.page.model import Model
 from pipelines.reports.page.scenes import with_known
 from pipelines.reports.page.surfaces import stones_of
 
-__all__ = [
-    "View",
-    "as_known_text",
-    "database_model",
-    "view_page",
-    "write_comparison_view",
-    "write_elevation",
-    "write_view",
-]
-
 _FACING = 0.2  # length of the mean normal from which stones have one direction [-]
 _MOST = 500  # rows of the table of stones
 _TABLE = ("code", "kind", "course", "zone", "phase", "depth", "depth_origin", "rms")

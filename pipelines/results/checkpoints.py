@@ -36,8 +36,6 @@ from mechanics.results.stages import StageResult
 from mechanics.scene.laws.law import Terms
 from mechanics.scene.state import State
 
-__all__ = ["Checkpoint", "Checkpoints", "DamagedError", "write_shared", "write_whole"]
-
 _RECORDS = {
     record.__name__: record
     for record in (

@@ -26,17 +26,6 @@ from ground.errors import UsageError, storing
 if sys.platform != "win32":
     import fcntl
 
-__all__ = [
-    "RUN_INDEX",
-    "UNFINISHED",
-    "UNFINISHED_ASSESSMENT",
-    "UNFINISHED_DIAGNOSIS",
-    "check_replaceable",
-    "locked",
-    "replacing",
-    "source_of",
-]
-
 RUN_INDEX = "summary.json"
 """Index of the results of a run."""
 

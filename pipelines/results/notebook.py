@@ -5,8 +5,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-__all__ = ["notebook_html"]
-
 
 def notebook_html(folder: Path, summary: Mapping[str, Any], warnings: Sequence[str]) -> str:
     """Return headline, cautions and warnings of a run with its page in a frame, for a notebook.

@@ -7,10 +7,9 @@ import numpy as np
 
 from archmodel.quantities import quantities_of
 from mechanics.arrays import Array, Bools
-from mechanics.results.result import Largest, Outcome, Peaks, Result
+from mechanics.dynamics.outcome import Outcome
+from mechanics.results.result import Largest, Peaks, Result
 from mechanics.scene.scene import Fidelity
-
-__all__ = ["peak_records", "realisations", "rocking_caution", "rocking_stones"]
 
 _LIFTED = 1e-3  # opening over the width of a stone, an angle [rad], from which it rocks: a hundredth of a slender one's
 _CLOSED = 0.5  # part of its largest opening that a joint has in the end, below which it has closed again [-]

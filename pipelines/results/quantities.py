@@ -17,9 +17,6 @@ from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Fidelity
 from pipelines.results.stone_values import stress_statistics
 
-__all__ = ["QUANTITIES", "Quantities", "StoneQuantities", "differences", "quantities", "quantities_from"]
-
-
 QUANTITIES: Mapping[str, str] = {
     "outcome": "1 if the scene ends otherwise, else 0",
     "von_mises_max": "largest Von Mises stress",

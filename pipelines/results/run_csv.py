@@ -12,8 +12,6 @@ from mechanics.results.result import Result
 from pipelines.results.stone_values import joint_values
 from pipelines.results.table_csv import inert
 
-__all__ = ["JOINT_COLUMNS", "SERIES_COLUMNS", "write_joints", "write_series"]
-
 JOINT_COLUMNS = {name: one.described for name, one in quantities_of("joint").items()}
 """Columns of joints.csv and their meaning."""
 

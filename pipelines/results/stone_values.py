@@ -14,8 +14,6 @@ from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Peaks, Result
 from mechanics.results.stress_values import volume_quantile
 
-__all__ = ["StressStatistics", "joint_values", "stone_results", "stress_statistics"]
-
 _STRESSES = (
     "principal_tension",
     "principal_compression",

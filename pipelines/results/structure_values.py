@@ -14,8 +14,6 @@ from archmodel.store.run_record import StructureValues
 from mechanics.arrays import Ints
 from mechanics.results.result import Result
 
-__all__ = ["COMPUTED", "Share", "computed", "crack_width", "structure_results"]
-
 
 @dataclass(frozen=True)
 class Share:

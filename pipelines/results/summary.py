@@ -20,8 +20,6 @@ from pipelines.results.peaks import peak_records, realisations, rocking_stones
 from pipelines.results.quantities import quantities
 from pipelines.results.stone_values import stress_statistics
 
-__all__ = ["as_json", "headline", "indeterminacy", "length_tolerance", "summarise"]
-
 _ROUNDING = 1e-13  # of the farthest coordinate [-]: the spacing of floating-point numbers, with reserve
 
 _FIDELITIES = (Fidelity.RIGID, Fidelity.DEFORMABLE, Fidelity.FIXED)

@@ -4,8 +4,6 @@ import csv
 import io
 from collections.abc import Iterable, Mapping
 
-__all__ = ["csv_text", "inert"]
-
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 

@@ -25,21 +25,6 @@ from pipelines.results.vtu import (
     write_vtu,
 )
 
-__all__ = [
-    "CONTACT_ARRAYS",
-    "FIDELITIES",
-    "UNITS",
-    "body_cells",
-    "body_grid",
-    "contact_grid",
-    "joint_grid",
-    "point_fields",
-    "status_numbers",
-    "write_frames",
-    "write_joint_grid",
-]
-
-
 FIDELITIES = (Fidelity.FIXED, Fidelity.RIGID, Fidelity.DEFORMABLE)
 """Models of stones by their number in the files."""
 

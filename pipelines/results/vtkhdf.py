@@ -26,8 +26,6 @@ from mechanics.scene.scene import Block
 from pipelines.results.vtk import CONTACT_ARRAYS, FIDELITIES, point_fields, status_numbers
 from pipelines.results.vtu import CELL_TYPES, POLYGON, VERTEX
 
-__all__ = ["RESULTS", "GrowingResults", "write_vtkhdf"]
-
 RESULTS = "results.vtkhdf"
 """Name of the file."""
 

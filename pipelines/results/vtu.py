@@ -14,19 +14,6 @@ from numpy.typing import NDArray
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 
-__all__ = [
-    "CELL_TYPES",
-    "LINE",
-    "POLYGON",
-    "POLYHEDRON",
-    "VERTEX",
-    "Cells",
-    "UnstructuredGrid",
-    "cells_of",
-    "write_pvd",
-    "write_vtu",
-]
-
 # cell types of VTK
 VERTEX, LINE, POLYGON, POLYHEDRON = 1, 3, 7, 42
 CELL_TYPES: Mapping[Element, int] = {

@@ -9,8 +9,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.results.result import BodyResult
 
-__all__ = ["WallAxes", "axes_of", "wall_axes", "wall_record"]
-
 _ONE_WAY = 0.87  # cos 30°: length of the mean level normal from which faces look one way, as those of a façade do [-]
 _ALONG = 0.996  # cos 5°: a direction within it of an axis has the name of the axis [-]
 

@@ -31,17 +31,6 @@ from survey.joints.close import ClosedStones, close_joints
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
-__all__ = [
-    "Assembly",
-    "assemble",
-    "assemble_stones",
-    "closed_stones",
-    "convex_parts_of",
-    "local_origin",
-    "stone_about",
-    "wishes_of",
-]
-
 _FAR = 10_000.0
 """Largest coordinates that are exact enough without a shift [m]."""
 _GRID = 1_000.0

@@ -47,8 +47,6 @@ from pipelines.tuning.profiles import with_profile
 from survey.geometry.solids import Solid
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["check_scene"]
-
 _INDEX = "check.json"
 # processor time of a run besides its simulation, on the machine of `cost_rates`:
 _PROGRAM = 12.0  # the program and its kernels are loaded, the report is written [s]

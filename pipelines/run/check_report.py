@@ -6,15 +6,6 @@ from dataclasses import dataclass
 from pipelines.run.closing_check import JointsReport, SimplificationReport
 from pipelines.run.filling import Filling
 
-__all__ = [
-    "CheckReport",
-    "Cost",
-    "MaterialUse",
-    "MeshQualityReport",
-    "MeshUse",
-    "StoneModelling",
-]
-
 
 @dataclass(frozen=True)
 class MaterialUse:

@@ -11,17 +11,6 @@ from pipelines.run.filling import LeafReport, leaf_report
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
 
-__all__ = [
-    "GapPlace",
-    "JointsReport",
-    "OutsideStone",
-    "OverlapPlace",
-    "SimplificationReport",
-    "joints_report",
-    "simplification_report",
-]
-
-
 _DEEP = 0.005  # measured overlap of two stones [m]; deeper ones should be looked at
 
 

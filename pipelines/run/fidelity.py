@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from mechanics.scene.scene import Fidelity
 from survey.joints.report import StoneJoint
 
-__all__ = ["Modelled", "Wishes", "modelled", "neighbours"]
-
 Neighbours = Mapping[str, Iterable[str]]
 
 

@@ -12,8 +12,6 @@ from survey.geometry.solids import Solid, volume_of
 from survey.joints.grown_leaf import GrownLeaf, Opening
 from survey.joints.report import StoneJoint
 
-__all__ = ["Filling", "LeafReport", "OpeningPlace", "filling", "leaf_report", "stays_open"]
-
 _NAMED = 5  # pairs of stones, and openings, that are named
 _SURROUNDED = 3  # sides of the frame that an opening about the wall reaches
 _REACHED = {"left": "the left side", "below": "the foot", "right": "the right side", "above": "the top"}

@@ -19,8 +19,6 @@ from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups, StoneModel
 
-__all__ = ["closing_lines", "run_inputs", "scene_inputs", "stage_lines"]
-
 _MAX_NAMED = 4  # surveys, sources of depths, gaps and overlaps that are named
 
 

@@ -14,8 +14,6 @@ from pipelines.run.unfinished import UnfinishedRun, unfinished_run
 from pipelines.scene.fingerprint import planar_fingerprint
 from pipelines.scene.settings import Output, ParaView
 
-__all__ = ["Write", "run_planar"]
-
 Write = Callable[[Path, PlanarResult, UnfinishedRun], None]
 """Writes results into an empty folder, given the archive of the run."""
 

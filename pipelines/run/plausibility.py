@@ -14,8 +14,6 @@ from survey.quality.corners import SeenFace, misplaced_corners
 from survey.quality.plausible import DENSITY, FRICTION, LENGTH, POISSON, YOUNG, Doubt, doubt_of
 from survey.records.survey import OUTLINE_NOTE
 
-__all__ = ["corner_warnings", "depth_warnings", "impossible_values", "unusual_values"]
-
 _SHOWN = 6  # most findings of one sort that are named
 _HEADERS = 0.1  # share of a façade's area whose stones reach through the leaf, as headers do, at least [-]
 _THIN = 0.8  # depth over that of the leaf below which a stone leaves a void behind it: backs are hewn to a tenth [-]

@@ -36,19 +36,6 @@ from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
 from survey.joints.report import ClosingReport, StoneJoint
 
-__all__ = [
-    "contact_columns",
-    "error_measures",
-    "joint_columns",
-    "run_record",
-    "settings_of",
-    "simplifications",
-    "store_record",
-    "surveyed_widths",
-    "versions",
-]
-
-
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "scikit-fem", "gmsh", "sqlalchemy")
 
 

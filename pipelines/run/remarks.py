@@ -12,8 +12,6 @@ from survey.joints.report import ClosingReport
 from survey.joints.settings import JointMode
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["remarks", "remarks_on_laws", "remarks_on_stones"]
-
 _MEASURED = ("points", "photograph")  # sources of faces that were measured, not imported with a solid
 _STRESS = 'ask for their stress by stress in [output], or give default = "deformable" in [bodies]'
 

@@ -17,11 +17,12 @@ from archmodel.relations.members import members_of_structures
 from archmodel.store.run_record import StoneResult
 from archmodel.tables.entries import latest_entry
 from ground.errors import MissingLibraryError, MomaError, UsageError, storing
+from mechanics.dynamics.outcome import Outcome
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.limit.dead_load import self_stress_alone_holds
 from mechanics.model.model import Model, build_model
 from mechanics.results.forecast.plan import loose_blocks
-from mechanics.results.result import Outcome, Result
+from mechanics.results.result import Result
 from mechanics.scene.scene import Fidelity
 from mechanics.scene.state import State
 from mechanics.simulate import simulate, simulate_stages
@@ -58,8 +59,6 @@ from pipelines.scene.selection import StoneModel, select_groups, select_stones
 from pipelines.scene.settings import ParaView
 from pipelines.tuning.expected_errors import ProfileReport, profile_report
 from pipelines.tuning.profiles import with_profile
-
-__all__ = ["USUAL", "RunOptions", "RunReport", "Writing", "chosen_pictures", "run_scene", "write_results"]
 
 USUAL = ("von_mises", "displacement")
 """Pictures of a scene that does not name any."""

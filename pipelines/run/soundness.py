@@ -15,11 +15,6 @@ from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
-__all__ = [
-    "caution_of", "in_rig", "problems_of", "refuse_unsound", "some", "stands_alone", "unfinished_loads",
-    "unsound_stones", "unsupported", "unsupported_stages",
-]  # fmt: skip
-
 _DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
 _LEVEL = 1e-3  # over the height of all stones, by which bottoms in one level differ [-]
 _NAMED = 6  # most stones, or pairs of stones, that one problem names

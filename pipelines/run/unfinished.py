@@ -20,8 +20,6 @@ from pipelines.results.vtkhdf import RESULTS, GrowingResults
 from pipelines.scene.fingerprint import changes
 from pipelines.scene.settings import Output, ParaView
 
-__all__ = ["UnfinishedRun", "finished_run", "unfinished_run"]
-
 _INPUTS = "inputs.json"
 _SHARE = 0.04  # most of the time that checkpoints may take; those that would take more are left out [-]
 _NAMED = 4  # changes that an error names

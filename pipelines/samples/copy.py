@@ -10,8 +10,6 @@ from zipfile import ZipFile
 
 from ground.errors import UsageError, storing
 
-__all__ = ["FOLDER", "SHIPPED", "WrittenSample", "copy_sample", "sample_names", "write_new"]
-
 SHIPPED = Path(__file__).parent / "files"
 """Folder of the archives, one a sample, and of their catalogue."""
 

@@ -14,8 +14,6 @@ from mechanics.scene.loads.time_series import History
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, tables_of
 
-__all__ = ["ArrayTable", "describe", "file_beside", "read_entries"]
-
 # alternative to time and value in the inline table of a time series
 _FILE = Key(
     "file", ValueKind.TEXT, "Text file with a column of times and one of values, or three.", default=None

@@ -30,8 +30,6 @@ from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import TomlDocument, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
 
-__all__ = ["BESIDE", "SceneFile", "parse_scene", "read_scene"]
-
 BESIDE = ("diagnosis", "hypotheses")
 """Tables that may stand in a scene file and are read by `moma diagnose` alone."""
 

@@ -14,8 +14,6 @@ from mechanics.scene.stages import Stage
 from mechanics.scene.state import State
 from pipelines.scene.selection import StoneModel
 
-__all__ = ["changes", "digest", "fingerprint", "planar_fingerprint"]
-
 _STONE = "stone "
 _SHOWN = 9  # numbers up to which an array stands in full
 _DIGITS = 16  # of the digest of a larger one

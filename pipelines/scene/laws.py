@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ground.settings import Setting
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -14,10 +15,8 @@ from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import LawRule
 from pipelines.scene.array_tables import ArrayTable, read_entries
-from pipelines.toml.keys import Groups, Setting, Texts, build, keys_of
+from pipelines.toml.keys import Groups, Texts, build, keys_of
 from pipelines.toml.schema import Key, TomlDocument, nearest
-
-__all__ = ["BONDS", "LAW_KEYS", "LAW_TYPES", "JointLaw", "law_rules", "read_laws"]
 
 BONDS = ("mortar", "cohesive_zone", "elastic_joint")
 """Types of laws that are mortar."""

@@ -6,33 +6,23 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ground.settings import Setting
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
 from mechanics.scene.loads.ground_motion import Component, GroundMotion
 from mechanics.scene.loads.load import Force, GravityChange, Loads, Motion
 from mechanics.scene.loads.motions import ImposedMotion, settlement, spreading
-from mechanics.scene.loads.record_files import UNITS, read_accelerogram, read_station, unit_of
+from mechanics.scene.loads.record_files import read_accelerogram, read_station
+from mechanics.scene.loads.record_formats import UNITS, unit_of
 from mechanics.scene.loads.record_processing import band_pass, without_drift
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.scene.array_tables import ArrayTable, file_beside, read_entries
 from pipelines.scene.stages import LoadTable
-from pipelines.toml.keys import Series, Setting, Stones, Vector, VectorSeries, keys_of
+from pipelines.toml.keys import Series, Stones, Vector, VectorSeries, keys_of
 from pipelines.toml.schema import Key, TomlDocument
-
-__all__ = [
-    "ASSESS_TYPES",
-    "FORCES",
-    "LOAD_KEYS",
-    "LOAD_TYPES",
-    "THROW_KEYS",
-    "build_loads",
-    "read_loads",
-    "read_throws",
-    "thrown",
-]
 
 _TABLES = (".csv", ".txt", ".dat", ".tsv")  # endings of records that seldom state a unit
 

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from ground.settings import Setting
 from mechanics.scene.rig import Rig
-from pipelines.toml.keys import Numbers, Setting, Vector, keys_of, typed_values
+from pipelines.toml.keys import Numbers, Vector, keys_of, typed_values
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table
-
-__all__ = ["PUSHOVER_KEYS", "SCATTER", "SCATTER_KEYS", "Pushing", "read_pushover"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,6 @@ from mechanics.scene.rig import Rig
 from mechanics.scene.scene import Scene
 from mechanics.stones.polyhedra import mass_properties
 
-__all__ = ["rig_cautions"]
-
 # stiffness of dry joints above all that were measured in a first loading, 5.9 to 12.9 GPa/m up to 1.25 MPa [Pa/m]
 _STIFF_DRY = 15e9
 # mean pressure above which measured dry walls lost force after their peak [Pa]

@@ -16,8 +16,6 @@ from pipelines.scene.file import SceneFile
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import nearest
 
-__all__ = ["SERIES", "STRESS", "Groups", "StoneModel", "select_groups", "select_stones"]
-
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
 
 STRESS = ("output", "stress")

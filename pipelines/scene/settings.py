@@ -10,8 +10,6 @@ from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.choice import Mesher
 
-__all__ = ["Fidelities", "MaterialRule", "MeshSettings", "Output", "ParaView", "Selection"]
-
 _COARSER = 2.0
 """Edges of the ring over those of the stones for whose sake it deforms: docs/accuracy.md, section 13."""
 

@@ -9,8 +9,6 @@ from ground.errors import SceneError
 from ground.settings import Setting
 from mechanics.stones.settings import check_settings
 
-__all__ = ["Site", "damping_factor"]
-
 _USUAL = 5.0  # damping of the code's spectrum [%]
 _MIN_DAMPING_FACTOR = 0.55  # of the factor of damping η [-]
 _LAST, _LASTED = 1.6, 4.0  # T_D = 1.6 + 4 ag/g [s]

@@ -5,20 +5,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from ground.errors import UsageError
+from ground.settings import Setting
 from pipelines.scene.array_tables import ArrayTable, read_entries
-from pipelines.toml.keys import Setting, Stones, Texts, keys_of
+from pipelines.toml.keys import Stones, Texts, keys_of
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import TomlDocument, nearest
-
-__all__ = [
-    "STAGE_KEYS",
-    "LoadTable",
-    "Stage",
-    "StandingStones",
-    "read_stages",
-    "refuse_stages",
-    "standing_stones",
-]
 
 Codes = frozenset[str]
 

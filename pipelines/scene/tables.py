@@ -4,16 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
+from ground.settings import Setting
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
-from pipelines.toml.keys import Setting, Stones, Vector, keys_of
+from pipelines.toml.keys import Stones, Vector, keys_of
 from pipelines.toml.schema import Key
 from survey.joints.settings import JointSettings
-
-__all__ = ["ARRAYS", "AUTO", "MATERIAL_KEYS", "MESH_KEYS", "ORTHOTROPY_KEYS", "SITE_KEYS", "TABLES"]
 
 ARRAYS = ("meshes", "laws", "loads", "throw", "stages", "assess")
 """Tables of which a scene may have many."""

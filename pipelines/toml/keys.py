@@ -14,23 +14,6 @@ from ground.settings import Setting
 from pipelines.toml.lines import Path
 from pipelines.toml.schema import REQUIRED, Key, TomlDocument, ValueKind, check_table
 
-__all__ = [
-    "Groups",
-    "Numbers",
-    "Series",
-    "Setting",
-    "Stones",
-    "Table",
-    "Texts",
-    "Vector",
-    "VectorSeries",
-    "Year",
-    "build",
-    "keys_of",
-    "read_table",
-    "typed_values",
-]
-
 Settings = TypeVar("Settings")
 
 Texts = tuple[str, ...]

@@ -8,8 +8,6 @@ from typing import Any
 
 from ground.errors import UsageError
 
-__all__ = ["Path", "key_lines", "line_of", "parse_toml", "read_text"]
-
 Path = tuple[str, ...]
 
 _TOKEN = re.compile(

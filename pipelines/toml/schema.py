@@ -12,8 +12,6 @@ from typing import Any, NoReturn
 from ground.errors import SceneError
 from pipelines.toml.lines import Path, line_of
 
-__all__ = ["REQUIRED", "Key", "TomlDocument", "ValueKind", "check_table", "nearest", "tables_of"]
-
 
 class _Required(Enum):
     REQUIRED = "required"

@@ -4,8 +4,6 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-__all__ = ["is_table_array", "toml_text"]
-
 
 def toml_text(tables: Mapping[str, Any]) -> str:
     """Return tables, arrays of tables and values as TOML.

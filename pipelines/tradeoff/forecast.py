@@ -10,8 +10,6 @@ from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tradeoff.worker import SHORT
 
-__all__ = ["Choice", "Forecast", "left_out", "next_run"]
-
 _USUAL_POWER = 1.5  # of the unknowns, by which time grows, until it has been measured
 _POWERS = (1.0, 2.5)  # bounds of the measured power: sparse factors of walls and of solid masonry
 _MEMORY_POWER = 1.3  # of the unknowns, by which memory grows

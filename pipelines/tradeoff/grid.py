@@ -14,8 +14,6 @@ from pipelines.scene.file import SceneFile
 from pipelines.tuning.overlay import Overlay
 from pipelines.tuning.profiles import PROFILES
 
-__all__ = ["Variant", "grid", "setting_name"]
-
 _CELLS = {
     Element.TET4: (1, 2, 3, 4, 6),
     Element.HEX8: (1, 2, 3, 4, 6),

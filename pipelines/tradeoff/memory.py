@@ -5,8 +5,6 @@ import os
 import sys
 from ctypes import wintypes
 
-__all__ = ["machine_memory", "peak_memory"]
-
 
 class _MachineStatus(ctypes.Structure):
     """MEMORYSTATUSEX of Windows."""

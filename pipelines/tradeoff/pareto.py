@@ -9,17 +9,6 @@ from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
 
-__all__ = [
-    "ErrorReference",
-    "Judged",
-    "Recommendation",
-    "cheapest",
-    "counted",
-    "front",
-    "judge",
-    "models_of_interest",
-]
-
 _CHANCE = 1.25  # ratio of processor times of the same work, run after run on a busy machine [-]
 _SOLVER_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
 _COARSER = 1.2  # least ratio of sizes at which one mesh gives an error estimate of another [-]

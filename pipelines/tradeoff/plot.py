@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Panel", "Point", "trade_png"]
-
 _COLOURS = {
     "as written": "#222222",
     "rigid": "#6b7a2a",

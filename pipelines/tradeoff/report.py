@@ -19,8 +19,6 @@ from pipelines.tradeoff.scheduler import Limits
 from pipelines.tradeoff.store import INDEX, Measured, Status, Store
 from pipelines.tuning.overlay import overlay_record, scene_lines
 
-__all__ = ["MAIN", "Goal", "study_png", "study_record", "write_study"]
-
 MAIN = (
     "von_mises_p99",
     "von_mises_max",

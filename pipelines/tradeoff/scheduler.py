@@ -14,8 +14,6 @@ from pipelines.tradeoff.pareto import models_of_interest
 from pipelines.tradeoff.store import Measured, Status, Store
 from pipelines.tradeoff.worker import Job, measured
 
-__all__ = ["Limits", "carry_out"]
-
 _PAUSE = 0.02  # interval between polls of the processes [s]
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 

@@ -20,8 +20,6 @@ from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
 from pipelines.tuning.overlay import Overlay, overlay_from, overlay_record
 
-__all__ = ["INDEX", "Measured", "Status", "Store", "study_key"]
-
 INDEX = "trade.json"
 _RUNS = "runs"
 

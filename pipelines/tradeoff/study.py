@@ -26,8 +26,6 @@ from pipelines.tradeoff.store import Store, study_key
 from pipelines.tradeoff.worker import Job
 from pipelines.tuning.overlay import typical_width
 
-__all__ = ["Asked", "TradeReport", "run_trade"]
-
 _STRESS = "von_mises"  # names of quantities with this in them are stresses
 _MEMORY_SHARE = 0.8  # share of the memory of the machine that runs may take together [-]
 

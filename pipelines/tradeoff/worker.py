@@ -14,8 +14,6 @@ from pipelines.scene.file import SceneFile, parse_scene
 from pipelines.tradeoff.memory import peak_memory
 from pipelines.tuning.overlay import Overlay, overlaid
 
-__all__ = ["SHORT", "Job", "measured"]
-
 SHORT = 5.0
 """CPU time below which work is done twice, since the first time includes loading compiled kernels [s]."""
 

@@ -9,24 +9,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mechanics.results.result import Outcome, Result
+from mechanics.dynamics.outcome import Outcome
+from mechanics.results.result import Result
 from mechanics.scene.scene import Fidelity
 from pipelines.results.quantities import QUANTITIES, Quantities, quantities
 from pipelines.scene.file import SceneFile
 from pipelines.tuning.measured_errors import COLLAPSE, ERRORS
 from pipelines.tuning.overlay import overlay_record
 from pipelines.tuning.profiles import profile_named
-
-__all__ = [
-    "BOUNDS",
-    "TYPICAL",
-    "Expected",
-    "ProfileReport",
-    "expected_errors",
-    "loops",
-    "measure",
-    "profile_report",
-]
 
 TYPICAL = ("stone_von_mises_p99",)
 """Quantities whose errors hardly vary between structures: a typical error is given."""

@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-__all__ = ["COLLAPSE", "ERRORS"]
-
 ERRORS: Mapping[str, Mapping[str, tuple[float, float, float]]] = {
     "fast": {
         "joint_forces": (1.43, 4.72e-08, 0.612),

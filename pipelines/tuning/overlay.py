@@ -13,16 +13,6 @@ from mechanics.stones.polyhedra import smallest_width
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 
-__all__ = [
-    "Overlay",
-    "overlaid",
-    "overlaid_scene",
-    "overlay_from",
-    "overlay_record",
-    "scene_lines",
-    "typical_width",
-]
-
 _ENUMS: Mapping[str, Any] = {
     "fidelity": Fidelity,
     "element": Element,

@@ -12,8 +12,6 @@ from pipelines.scene.selection import StoneModel
 from pipelines.toml.schema import nearest
 from pipelines.tuning.overlay import Overlay, overlaid, typical_width
 
-__all__ = ["PROFILES", "Profile", "profile_named", "with_profile"]
-
 
 @dataclass(frozen=True)
 class Profile:

@@ -33,8 +33,6 @@ from survey.quality.plausible import question_of_unit
 from survey.records.review import Doubtful
 from survey.records.survey import OBSERVER, BlockRecord, Reject, Station, SurveyHead, SurveyStream
 
-__all__ = ["Progress", "first_codes", "open_cloud", "viewed", "wrong_outlines"]
-
 Progress = Callable[[int, int | None], None]
 """A function that is told how many points are read, and how many there are."""
 

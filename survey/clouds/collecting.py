@@ -16,8 +16,6 @@ from survey.clouds._kernels.collect import Frames, Grid, Patches, Rings, Samples
 from survey.clouds.placing import PlacedOutline
 from survey.clouds.points.chunks import PointCloud
 
-__all__ = ["Collected", "collect_points", "divide"]
-
 _PATCHES = 36  # of a face: the fit of planes tells outliers apart best among 20 to 50 points
 _DENSE = 5  # points of a patch whose mean says something
 _MIN_PATCHES = 9  # patches from which a plane and its scatter are known

@@ -5,8 +5,6 @@ from typing import Any
 
 from ground.errors import UsageError
 
-__all__ = ["optional"]
-
 
 def optional(module: str, what: str) -> Any:
     """Import an optional package.

@@ -27,8 +27,6 @@ from survey.records.survey import (
     SurveyStream,
 )
 
-__all__ = ["open_masks"]
-
 _STRETCHED = 0.02  # by which the two sides of a pixel may differ before it is doubtful [-]
 _TWICE = 1.5  # standard deviations between two corners that are one
 _NEAREST = 0.001  # and metres

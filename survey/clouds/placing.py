@@ -13,8 +13,6 @@ from survey.geometry.polygons import ring_area
 from survey.geometry.solids import area_vector
 from survey.records.survey import Station
 
-__all__ = ["PlacedOutline", "facing_station", "levelled", "place_outlines"]
-
 _LEVEL = 1e-6  # difference of heights of corners that have one elevation [m]
 _UPRIGHT = 0.5  # upward component of its normal below which a wall is upright
 

@@ -15,8 +15,6 @@ from survey.clouds.placing import PlacedOutline
 from survey.geometry.polygons import ring_area, seamless
 from survey.records.review import Doubtful
 
-__all__ = ["drawn_doubts", "flat_doubts", "measured_doubts"]
-
 _OVERLAP = 0.05  # part of the smaller stone's area that two outlines may share: jitter of neighbours
 _WITHIN = 0.5  # of an outline's area in a larger one, above which it lies within this
 _FRAMED = 3  # outlines that a frame holds at least

@@ -8,8 +8,6 @@ from ground.errors import UsageError
 from survey.clouds.wall import Wall
 from survey.formats.options import ReadingOptions
 
-__all__ = ["MASONRY", "CloudOptions", "MaskOptions", "OutlineSettings"]
-
 MASONRY = ("auto", "ashlar", "coursed", "brick", "rubble")
 """Kinds of masonry; `auto` decides between courses and rubble."""
 

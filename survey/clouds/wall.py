@@ -19,8 +19,6 @@ from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.quality.facades import WallPlane
 
-__all__ = ["Wall", "read_wall", "wall_lines"]
-
 Wall = WallPlane
 """Frame of a wall: origin, and axes to the right, up and outwards."""
 

@@ -9,8 +9,6 @@ import numpy as np
 from ground.errors import SurveyError
 from survey.arrays import Array
 
-__all__ = ["PixelPlace", "world_file", "world_of"]
-
 _SCALE, _TIE, _MATRIX = 33550, 33922, 34264
 """Tags of GeoTIFF: size of a pixel, a tie point, a matrix."""
 

@@ -8,8 +8,6 @@ from numba import njit
 
 from survey.arrays import Array
 
-__all__ = ["FacePlane", "HiddenSide", "corner_deviations"]
-
 
 class FacePlane(NamedTuple):
     """Plane of a face and its precision.

@@ -12,8 +12,6 @@ from typing import Literal
 from ground.errors import SurveyError
 from survey.records.survey import BlockRecord, DepthRule
 
-__all__ = ["Depth", "Origin", "depth_for"]
-
 Origin = Literal["stone", "rule", "kind", "structure", "solid"]
 """Origin of a depth: the stone itself, a rule for course or zone, its kind, the structure, or an imported solid."""
 

@@ -13,9 +13,6 @@ from survey.faces.faces import Face
 from survey.geometry.solids import Solid
 from survey.records.survey import Extrusion
 
-__all__ = ["SurveyedBlock", "extrude", "hidden_side", "prism"]
-
-
 _STRAIGHT = Extrusion()
 _FLATTEST = np.cos(np.radians(60.0))  # a direction farther from the normal leaves a sliver, not a stone
 

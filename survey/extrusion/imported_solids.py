@@ -14,9 +14,6 @@ from survey.faces.shapes import FaceShape, ShapeKind
 from survey.geometry.solids import Solid, area_vector
 from survey.records.survey import BlockRecord, Extrusion, SolidRecord
 
-__all__ = ["block_of_solid"]
-
-
 _UPRIGHT = 0.9  # slope (sine) of a normal beyond which the side is a bed or a top, not a face
 _ALIKE = 0.01  # relative difference of areas below which two sides may be front and back of one stone
 _SHALLOWEST = 1e-6  # least depth behind the face [m]

@@ -23,8 +23,6 @@ from survey.arrays import Array
 from survey.faces.planes import FaceFit
 from survey.geometry.solids import plane_frame
 
-__all__ = ["CommonPlane", "PlaneEstimate", "common_plane"]
-
 Indices = NDArray[np.intp]
 
 _MOST_STUDENT = 3.0  # ν/(ν - 2) where ν is 3; it does not exist for two

@@ -14,9 +14,6 @@ from survey.faces.shapes import FaceShape, judge_shape
 from survey.geometry.solids import area_vector
 from survey.records.survey import BlockRecord
 
-__all__ = ["Face", "Provenance", "Source", "face_on", "outline_face"]
-
-
 Source = Literal["points", "photograph", "solid", "hypothesis"]
 """Kinds of evidence for a face."""
 

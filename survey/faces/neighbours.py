@@ -10,8 +10,6 @@ from scipy.spatial import cKDTree
 from survey.arrays import Array
 from survey.faces.planes import FaceFit
 
-__all__ = ["MeasuredFace", "Neighbours"]
-
 Indices = NDArray[np.intp]
 
 _SAME_WAY = float(np.cos(np.radians(30.0)))  # faces turned farther belong to another wall

@@ -8,8 +8,6 @@ import numpy as np
 from ground.errors import GeometryError
 from survey.arrays import Array
 
-__all__ = ["Outline", "OutlineMeasures", "level_direction", "measure_outline", "outline_polygon"]
-
 Point = tuple[float, float]
 
 _NEAREST = 1e-3  # corners nearer than this are one corner measured twice, however precise [m]

@@ -26,9 +26,6 @@ from numpy.typing import ArrayLike
 from ground.errors import GeometryError
 from survey.arrays import Array
 
-__all__ = ["FaceFit", "fit_plane", "with_shared_errors"]
-
-
 _NOWHERE = np.full(3, math.nan)
 _LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt beyond which a plane is refused
 

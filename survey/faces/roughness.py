@@ -18,8 +18,6 @@ from survey.arrays import Array
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord
 
-__all__ = ["SIGNIFICANT", "TOLERANCE", "estimate_roughness", "rough_sigmas"]
-
 SIGNIFICANT = 3.0
 """Standard deviations beyond which a scatter differs from the stated one not by chance."""
 

@@ -12,8 +12,6 @@ from survey.arrays import Array, Bools
 from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces.planes import FaceFit
 
-__all__ = ["FaceShape", "ShapeKind", "explain_heights", "judge_shape", "likely_ratio"]
-
 
 class ShapeKind(StrEnum):
     """Kinds of shape of a face."""

@@ -6,8 +6,6 @@ import unicodedata
 from ground.errors import SurveyError
 from ground.tables.numbers import shown
 
-__all__ = ["CODE", "KIND", "NO_COURSE", "NUMBERED_ANEW", "code_of", "parse_course"]
-
 CODE = re.compile(r"[^\W_][\w.+/:-]{0,63}")
 """Pattern of the name of a stone."""
 

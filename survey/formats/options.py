@@ -7,8 +7,6 @@ from pathlib import Path
 from ground.errors import UsageError
 from survey.records.survey import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
 
-__all__ = ["ReadingOptions", "whole"]
-
 
 @dataclass(frozen=True)
 class ReadingOptions:

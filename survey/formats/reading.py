@@ -5,27 +5,13 @@ from pathlib import Path
 
 from ground.errors import UsageError
 from ground.tables.numbers import unreadable
-from survey.formats.native.reader import open_moma, read_head, with_header
+from survey.formats.native.reader import open_moma
 from survey.formats.options import ReadingOptions, whole
 from survey.formats.points.geojson import open_geojson
 from survey.formats.points.gsi import open_gsi
 from survey.formats.points.survey_xml import open_jobxml, open_landxml
 from survey.formats.tables.reader import is_table, open_csv, open_penzd, open_pnezd
 from survey.records.survey import Survey, SurveyStream
-
-__all__ = [
-    "ENDINGS",
-    "FORMATS",
-    "SOLIDS",
-    "Reader",
-    "ReadingOptions",
-    "format_of",
-    "open_survey",
-    "read_head",
-    "read_survey",
-    "solid_files",
-    "with_header",
-]
 
 Reader = Callable[[Path, ReadingOptions], SurveyStream]
 """A function that begins to read a file."""

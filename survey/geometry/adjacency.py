@@ -21,16 +21,6 @@ from survey.geometry._kernels.adjacency import GROUPS, face_planes, touching_fac
 from survey.geometry._kernels.between import hidden, thinnest_of
 from survey.geometry._kernels.boxes import count_near, list_near, morton_codes
 
-__all__ = [
-    "PolyhedraBuilder",
-    "SolidArrays",
-    "Touching",
-    "boxes_of",
-    "find_touching",
-    "near_pairs",
-    "open_to_each_other",
-]
-
 
 @dataclass(frozen=True)
 class SolidArrays:

@@ -26,8 +26,6 @@ from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, planes_of_solid, volume_of
 from survey.geometry.watertight import triangulate
 
-__all__ = ["convex_parts"]
-
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 

@@ -6,9 +6,6 @@ import numpy as np
 
 from survey.geometry.solids import Solid, highest_corner, planes_of_solid
 
-__all__ = ["ReflexEdge", "flatness", "is_convex", "reflex_edges"]
-
-
 _FLAT = 1e-9  # of its size: height within which a corner lies on a plane and an edge is not reflex
 _WARPS = 4.0  # warps of two faces by which one may seem to stand in front of the other
 

@@ -10,8 +10,6 @@ from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.cutting import FULL, CutSolid, cut_out
 from survey.geometry.solids import Solid, area_vector
 
-__all__ = ["CutStone", "common_part", "cut_stones", "joins_three", "moves"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 _ON_PLANE_DISTANCE = 1e-10  # metres: distance within which a corner lies on a plane

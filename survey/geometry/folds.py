@@ -12,8 +12,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.geometry.solids import area_vector
 
-__all__ = ["fold", "warp"]
-
 Polygon = tuple[int, ...]
 
 _ALIKE = 1e-6  # of a polygon's size: difference below which warps are equal

@@ -11,8 +11,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.geometry.solids import BOX, Solid
 
-__all__ = ["intersection"]
-
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 Polygon = tuple[int, ...]

@@ -22,9 +22,6 @@ from scipy.sparse.linalg import splu
 
 from survey.arrays import Array, Ints
 
-__all__ = ["Settled", "settle"]
-
-
 _STEPS = 30
 _POLISH = 4
 _DONE = 1e-14  # of the size of all: smaller steps are rounding

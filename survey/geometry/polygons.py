@@ -9,8 +9,6 @@ import numpy as np
 from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools
 
-__all__ = ["Seamless", "inside", "ring_area", "seamless"]
-
 _WIDEST = 0.05  # gap between two stones that is a joint [m]
 _PARALLEL = math.cos(math.radians(10.0))  # of the angle between the two sides of a joint
 _ALONG = 0.5  # of the shorter of two sides: their common length, at least

@@ -7,20 +7,6 @@ import numpy as np
 
 from survey.arrays import Array, Ints
 
-__all__ = [
-    "BOX",
-    "Solid",
-    "area_vector",
-    "area_vectors",
-    "highest_corner",
-    "highest_corners",
-    "plane_frame",
-    "planes_alike",
-    "planes_of_solid",
-    "volume_of",
-    "volumes_alike",
-]
-
 BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 """Faces of a box whose corner k is at bits k₂ k₁ k₀ of its three axes; outward if the axes are right-handed."""
 

@@ -10,8 +10,6 @@ from survey.geometry.convex_parts import convex_parts
 from survey.geometry.solids import BOX, Solid, area_vector, volume_of
 from survey.geometry.watertight import triangulate
 
-__all__ = ["grid_parts", "stone_parts"]
-
 _MANY = 40  # least number of faces of a solid that is tried as a storey of infill first
 
 

@@ -17,8 +17,6 @@ from survey.geometry.solids import (
     volumes_alike,
 )
 
-__all__ = ["check_watertight", "doubtful_solids", "triangulate"]
-
 _CONVEX_TOLERANCE = 1e-9  # metres: height of a corner in front of a face plane
 _ON_A_SIDE = 1e-12  # of a triangle's size: distance within which a corner is on its side
 

@@ -9,8 +9,6 @@ from numba import njit
 from survey.arrays import Array, Bools, Ints
 from survey.geometry._kernels.vectors import dot, height_over
 
-__all__ = ["KNOWN", "FaceCorners", "continuing_faces", "fit_middle_planes"]
-
 _ROUNDS = 30
 _HUBER = 1.5
 """Robust standard deviations beyond which residuals lose weight."""

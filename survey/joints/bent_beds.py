@@ -17,9 +17,6 @@ from survey.geometry.adjacency import SolidArrays
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
-__all__ = ["fit_bent_bed"]
-
-
 _FINE = 0.5  # of the straightness: distance from the chain that is preferred for corners
 _MAX_OFF_SHARE = 0.1  # largest part of the sound corners that may be off the chain
 _WORN = 0.01  # weight of a worn corner

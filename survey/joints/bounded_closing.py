@@ -17,9 +17,6 @@ from survey.joints.settings import JointSettings
 from survey.joints.worn_sides import mended_planes
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["Cut", "LocalStones", "as_building", "close_within_bounds"]
-
-
 _OPENING_ROUNDS = (
     10  # rounds in which single joints are left open; then all joints of a stone that moves too far
 )

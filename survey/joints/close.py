@@ -28,9 +28,8 @@ from survey.joints.grown.leaf import Leaf, find_leaves
 from survey.joints.overlaps import Overlapping, find_overlaps, part_stones
 from survey.joints.report import ClosingReport, StoneJoint, closing_report
 from survey.joints.settings import JointMode, JointSettings
-from survey.simplify.simplify import BlockShape, BlockyStone, simplify
-
-__all__ = ["ClosedStones", "close_joints", "closed_solids", "newly_facing"]
+from survey.simplify.result import BlockShape
+from survey.simplify.simplify import BlockyStone, simplify
 
 _ROUNDS = 4  # rounds in which closing joints reveals further ones, beside worn corners
 _MEETS = 1e-6  # metres: distance within which faces share a plane

@@ -23,9 +23,6 @@ from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.hidden_sides import HiddenSides, common_planes
 from survey.joints.settings import JointSettings
 
-__all__ = ["ContactPlanes", "StoneFaces", "contact_planes", "some_links"]
-
-
 _ALIKE = 0.985  # cosine of 10°: largest angle between faces of neighbours that continue each other
 _MAX_OFF_SHARE = 0.25  # largest part of the corners of a joint that may be off it
 _FINE = 0.5  # of the straightness: distance within which the inliers of a straight bed lie

@@ -9,8 +9,6 @@ from survey.geometry._kernels.adjacency import face_planes, facing_faces
 from survey.geometry.adjacency import SolidArrays, boxes_of, near_pairs, open_to_each_other
 from survey.joints.settings import JointSettings
 
-__all__ = ["FacePlanes", "FacingFaces", "find_facing", "planes_of"]
-
 
 @dataclass(frozen=True)
 class FacePlanes:

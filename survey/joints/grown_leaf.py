@@ -8,8 +8,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.geometry.polygons import ring_area
 
-__all__ = ["GrownLeaf", "Opening"]
-
 
 @dataclass(frozen=True)
 class Opening:

@@ -13,8 +13,6 @@ from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
 
-__all__ = ["HiddenSides", "common_planes"]
-
 # rounds in which the members of a plane and the plane itself are found from each other, at most
 _MAX_PLANE_ITERATIONS = 10
 

@@ -11,9 +11,6 @@ from survey.geometry.adjacency import boxes_of, near_pairs
 from survey.geometry.cutting import common_part, cut_stones, moves
 from survey.geometry.solids import Solid, volume_of
 
-__all__ = ["Overlapping", "find_overlaps", "part_stones"]
-
-
 _DEPTH_ROUNDING = 1e-10  # metres: depth of overlap of solids that share a plane that is due to rounding
 _ON_PLANE = 1e-8  # metres: distance within which a corner lies on a plane
 _LEAST_VOLUME = 1e-12  # cubic metres: smallest overlap

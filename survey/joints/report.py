@@ -15,8 +15,6 @@ from survey.joints.grown_leaf import GrownLeaf
 from survey.joints.overlaps import Overlapping
 from survey.joints.settings import JointMode, JointSettings
 
-__all__ = ["ClosingReport", "Gap", "Overlap", "StoneJoint", "closing_report"]
-
 
 @dataclass(frozen=True)
 class StoneJoint:

@@ -6,8 +6,6 @@ from typing import Annotated
 
 from ground.settings import Setting
 
-__all__ = ["JointMode", "JointSettings"]
-
 
 class JointMode(StrEnum):
     """Treatment of the open joints of a survey.

@@ -14,9 +14,6 @@ from survey.arrays import Array, Bools, Ints
 from survey.geometry.solids import Solid
 from survey.joints.contact_planes import StoneFaces
 
-__all__ = ["mended_planes"]
-
-
 _ALIKE = 0.985  # cosine of 10°: largest angle between sides that continue each other or are parallel
 _CORNER_DISTANCE = 0.03  # metres: distance of a neighbour's corner from a side that it continues
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["INTERIOR", "Camera", "Control", "Network", "Photo", "PlumbLine", "ScaleBar", "listed"]
-
 INTERIOR = ("c", "xp", "yp", "as", "sk", "K1", "K2", "K3", "P1", "P2")
 """Parameters of the interior orientation, in the order of the kernels."""
 

@@ -10,8 +10,6 @@ from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.orientation.network import Camera, Photo, listed
 
-__all__ = ["Oriented"]
-
 
 @dataclass(frozen=True)
 class Oriented:

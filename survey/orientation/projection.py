@@ -5,8 +5,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.orientation.network import Camera
 
-__all__ = ["brown", "corrected", "directions", "project"]
-
 _MAX_ITERATIONS = 50  # iterations of the inverse of the distortion
 _CLOSE = 1e-13  # its precision, relative to the camera constant
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from survey.arrays import Array
 
-__all__ = ["angle_slopes", "angles", "from_angles", "turned"]
-
 
 def from_angles(omega: float, phi: float, kappa: float) -> Array:
     """Return R of three angles [rad].

@@ -18,8 +18,6 @@ from ground.statistics.roots import root_of
 from ground.statistics.scale import spread
 from survey.arrays import Array
 
-__all__ = ["BedCorners", "BedScatter", "corner_roughness", "fit_bed", "pool", "scatter_of"]
-
 Rows = NDArray[np.intp]
 
 _FREEDOM = 5  # least number of differences between corners of one stone from which κ is estimated

@@ -11,9 +11,6 @@ from survey.arrays import Array
 from survey.quality.precision import StoneQuality
 from survey.records.survey import Canon
 
-__all__ = ["ENOUGH", "Deviation", "KindStandard", "deviations", "standards"]
-
-
 ENOUGH = 5
 """Least number of stones of a kind for a median and its scatter."""
 

@@ -29,9 +29,6 @@ from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import SideConvergence, sloped_side, wedges
 
-__all__ = ["SIGNIFICANT", "Contradiction", "contradictions"]
-
-
 SIGNIFICANT = 3.0
 """Standard deviations of the measurement beyond which a stone contradicts its kind."""
 

@@ -18,8 +18,6 @@ from survey.geometry.polygons import ring_area, seamless
 from survey.quality.canon import ENOUGH
 from survey.quality.facades import find_facades
 
-__all__ = ["Misplaced", "SeenFace", "Sign", "misplaced_corners"]
-
 _DEEP = 0.03  # thickness of the overlap of two faces [m]: two usual joints, more than rough edges interlock
 _JOINT = 0.05  # distance of the boxes of two faces that have a joint [m]
 _BESIDE = 0.25  # distance of two faces, one in front of the other, beyond which they do not collide [m]

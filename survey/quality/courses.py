@@ -22,17 +22,6 @@ from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import Side, lies_along, sides_of, spanning_stones
 
-__all__ = [
-    "ENOUGH",
-    "CourseHeight",
-    "CourseLine",
-    "course_heights",
-    "lower_corners",
-    "measure_courses",
-    "with_scatter",
-]
-
-
 ENOUGH = 5
 """Least number of stones for the scatter of a course's beds: with fewer, τ is uncertain by half."""
 

@@ -22,8 +22,6 @@ from survey.quality.departures.beds import measure_beds
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
-__all__ = ["AS_PLANNED", "Built", "Deformation", "DeformationGroup", "measure_deformation"]
-
 Displacement = Callable[[str, Array], Array]
 """Displacement (n, 3) of points (n, 3) of the stone of a code [m]."""
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools
 
-__all__ = ["LEVEL", "WIDEST", "Facade", "WallPlane", "find_facades", "upright_frame"]
-
 WIDEST = 30.0
 """Largest angle of a face from the mean direction of its facade [degrees]."""
 

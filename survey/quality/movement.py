@@ -18,8 +18,6 @@ from survey.quality.courses import ENOUGH, CourseLine
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
-__all__ = ["CourseMovement", "Misfit", "PlumbMovement", "StoneMovement", "compare_courses", "compare_plumb"]
-
 Displacement = Callable[[str, Array], Array]
 """Displacement (n, 3) of points (n, 3) of the stone of a code [m]."""
 

@@ -13,19 +13,6 @@ import numpy as np
 from ground.tables.columns import UNITS
 from survey.arrays import Array
 
-__all__ = [
-    "DENSITY",
-    "FRICTION",
-    "LENGTH",
-    "POISSON",
-    "YOUNG",
-    "Doubt",
-    "Range",
-    "doubt_of",
-    "lies_on_its_side",
-    "question_of_unit",
-]
-
 
 @dataclass(frozen=True)
 class Range:

@@ -13,9 +13,6 @@ from survey.arrays import Array, Ints
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.roughness import SIGNIFICANT, TOLERANCE
 
-__all__ = ["Histogram", "StoneQuality", "SurveyQuality", "appraise", "judge_survey"]
-
-
 _NOTHING = "no stone has points of its own on its face: nothing was measured that could be judged"
 _REACH, _BIN = 5.0, 0.25  # of the histogram [standard deviations]; the end bins hold all beyond
 

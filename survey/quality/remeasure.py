@@ -19,18 +19,6 @@ from survey.quality.departures.depths import DoubtfulDepth
 from survey.quality.precision import StoneQuality, SurveyQuality
 from survey.records.survey import Reject
 
-__all__ = [
-    "BLUNDERS",
-    "SCATTER",
-    "SMOOTH",
-    "TILT",
-    "Remeasure",
-    "ShortList",
-    "Urgency",
-    "list_remeasures",
-    "short_list",
-]
-
 TILT = 0.5
 """Uncertainty of a plane's tilt above which it is too weak: 0.4 m behind the face it makes a hidden corner
 uncertain by 3.5 mm, a third of a joint [degrees]."""

@@ -15,9 +15,6 @@ from survey.arrays import Array
 from survey.quality.facades import Facade, upright_frame
 from survey.quality.precision import StoneQuality
 
-__all__ = ["Side", "SideConvergence", "lies_along", "sides_of", "sloped_side", "spanning_stones", "wedges"]
-
-
 _ARCH = ("voussoir", "keystone")
 _SPANNING = (*_ARCH, "lintel")
 _REACH = 3.0  # of the stone's larger dimension: distance within which its neighbours in the arch are

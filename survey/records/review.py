@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = ["Doubtful"]
-
 
 @dataclass(frozen=True)
 class Doubtful:

@@ -10,29 +10,6 @@ from survey.arrays import Array
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 
-__all__ = [
-    "DEPTH_ORIGINS",
-    "FRAME_NOTE",
-    "OBSERVER",
-    "OUTLINE_NOTE",
-    "BlockRecord",
-    "Canon",
-    "ControlPoint",
-    "DepthRule",
-    "Extrusion",
-    "PhotoMark",
-    "Photograph",
-    "PointMark",
-    "Reject",
-    "SolidRecord",
-    "Station",
-    "SurfaceRule",
-    "Survey",
-    "SurveyHead",
-    "SurveyStream",
-]
-
-
 DEPTH_ORIGINS = ("stone", "rule", "kind", "structure", "solid")
 """Origins of a depth that a record may state, as `query` gives them; that of a solid is measured on the stone."""
 

@@ -25,9 +25,6 @@ from survey.registration.projective import (
     mapped_points,
 )
 
-__all__ = ["Homography", "fit_homography"]
-
-
 _MAX_STEPS = 30  # of the adjustment; good marks need four
 _CLOSE = 1e-12  # step of the reduced parameters, which are of the order of 1, that is rounding
 _TESTABLE = 5  # least number of points without the outliers: any four agree exactly

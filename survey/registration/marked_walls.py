@@ -19,9 +19,6 @@ from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import Photograph
 from survey.registration.homography import Homography, fit_homography
 
-__all__ = ["OFF_SQUARE", "MarkedWall", "wall_of_marks"]
-
-
 OFF_SQUARE = float(np.tan(np.radians(15.0)))
 """Standard deviation of the tangent between a line of sight from an unknown station and the wall's normal."""
 

@@ -20,9 +20,6 @@ from scipy.special import chdtri
 
 from survey.arrays import Array, Bools
 
-__all__ = ["LEVEL", "Agreement", "Outliers", "find_outliers", "point_tests"]
-
-
 LEVEL = 1e-3
 """Probability that a sound point, or a sound set of points, is rejected: Baarda's α₀."""
 

@@ -21,9 +21,6 @@ from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord, Photograph, SurveyHead
 from survey.registration.marked_walls import OFF_SQUARE, MarkedWall, wall_of_marks
 
-__all__ = ["LiftedFace", "lift", "lift_faces", "plane_of_wall"]
-
-
 _COARSEST = 0.1  # largest standard deviation of a corner over the size of the stone
 _SMALLEST = 1e-3  # least distance between the farthest corners [m]
 _MIN_SIGMA = 1e-9  # standard deviation that is rounding [rad, m]

@@ -11,8 +11,6 @@ import numpy as np
 
 from survey.arrays import Array
 
-__all__ = ["ReducedFrame", "direct_homography", "frame_of", "linearised", "mapped_points"]
-
 
 @dataclass(frozen=True)
 class ReducedFrame:

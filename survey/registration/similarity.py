@@ -16,9 +16,6 @@ import numpy as np
 from survey.arrays import Array, Bools
 from survey.registration.outliers import Agreement, point_tests
 
-__all__ = ["Similarity", "adjust_similarity", "best_similarity"]
-
-
 _MAX_STEPS = 30  # of the adjustment; good points need four
 _CLOSE = 1e-14  # step, relative to the size of the set, that is rounding
 

@@ -25,8 +25,6 @@ from survey.records.survey import BlockRecord, ControlPoint, Extrusion, SolidRec
 from survey.registration.outliers import LEVEL, Agreement, find_outliers
 from survey.registration.similarity import Similarity, adjust_similarity
 
-__all__ = ["SiteTransform", "fit_similarity", "record_to_site", "to_site"]
-
 Stone = TypeVar("Stone", bound=BlockRecord | SolidRecord)
 
 _WEAKEST_ANGLE = 0.1  # standard deviation of a rotation beyond which it is not determined [rad]

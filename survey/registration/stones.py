@@ -19,8 +19,6 @@ from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, 
 from survey.registration.photographed_stones import LiftedFace, lift_faces
 from survey.registration.site_frame import SiteTransform, fit_similarity, record_to_site, to_site
 
-__all__ = ["SurveyedStream", "survey_stones"]
-
 _SAMPLE = (
     300  # first stones of a survey, from whose faces its roughness is estimated: known to a few per cent
 )

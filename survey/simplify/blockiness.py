@@ -15,17 +15,6 @@ from survey.simplify._kernels.blockiness import (
     worst_angle,
 )
 
-__all__ = [
-    "about",
-    "common_share",
-    "face_vectors",
-    "from_edges",
-    "largest_skew",
-    "moved_corners",
-    "solid_planes",
-    "solid_volume",
-]
-
 
 def about(solid: Solid, origin: Array) -> Solid:
     """Return a solid relative to an origin (3,) near it, which keeps rounding small."""

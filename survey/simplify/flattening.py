@@ -20,8 +20,6 @@ from survey.geometry.convexity import is_convex
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import face_vectors, from_edges
 
-__all__ = ["FlatSolid", "flatten", "unfold"]
-
 Face = tuple[int, ...]
 
 _WARP = 0.1  # of a stone's width: largest displacement of a corner that makes its warped faces plane

@@ -20,9 +20,6 @@ from survey.simplify.flattening import FlatSolid, flatten, unfold
 from survey.simplify.result import BlockShape, SimpleSolid, Simplified, prism_shape
 from survey.simplify.squaring import SimplifyBounds
 
-__all__ = ["simplify_solid"]
-
-
 _PLANE = 5e-9  # metres: warp of a planar face due to rounding in a national grid
 _CONVEX = 1e-10  # of a stone's size: height below which a corner is on a face
 _FLAT = 1e-12  # of the cube on a stone's length: volume below which a solid is flat

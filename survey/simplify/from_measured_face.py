@@ -18,9 +18,6 @@ from survey.simplify.result import BlockShape, SimpleSolid, Simplified, prism_sh
 from survey.simplify.squaring import SimplifyBounds, SquaredFace, nearest_quadrilateral, square_face
 from survey.simplify.worn_corners import restore_worn
 
-__all__ = ["simplify_face"]
-
-
 _EQUAL = 1e-12  # of a stone's size: difference below which coordinates are equal
 _SLIVER = 1e-6  # metres, and of its length: thickness below which a solid encloses nothing
 

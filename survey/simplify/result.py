@@ -6,8 +6,6 @@ from enum import StrEnum
 from survey.arrays import Array, Bools
 from survey.geometry.solids import Solid
 
-__all__ = ["BlockShape", "SimpleSolid", "Simplified", "prism_shape"]
-
 
 class BlockShape(StrEnum):
     """Shape of a simplified stone.

@@ -18,8 +18,6 @@ from survey.simplify.from_measured_face import simplify_face
 from survey.simplify.result import BlockShape, Simplified
 from survey.simplify.squaring import SimplifyBounds
 
-__all__ = ["BlockShape", "BlockyStone", "Simplified", "SimplifyBounds", "simplify"]
-
 _BOUNDS = SimplifyBounds()
 
 

@@ -15,9 +15,6 @@ import numpy as np
 from survey.arrays import Array, Bools, Ints
 from survey.simplify._kernels.squaring import square
 
-__all__ = ["SimplifyBounds", "SquaredFace", "nearest_quadrilateral", "square_face"]
-
-
 _BOUNDLESS = np.array([np.inf, np.inf, np.inf, np.inf, 0.0])
 
 

@@ -8,8 +8,6 @@ from synthetic.bond import PlannedStone
 from synthetic.building import Draft, SyntheticBuilding, flat_stone, measured_building, observer
 from synthetic.frame import WallFrame
 
-__all__ = ["block_on_ground"]
-
 _FOOT = np.array([10.0, 20.0, 5.0])  # of the block's front edge in the site [m]
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 

@@ -13,8 +13,6 @@ from synthetic.building import Draft, SyntheticBuilding, flat_stone, measured_bu
 from synthetic.buildings.walls import bed_heights, plan_courses
 from synthetic.frame import BATTER, Movement, WallFrame, build_stone, wall_frame
 
-__all__ = ["BACK", "TwoFacings", "two_facings"]
-
 BACK = "inside"
 """Name of the station from which the second facing was seen."""
 

@@ -14,8 +14,6 @@ import numpy as np
 
 from synthetic.bond import PlanLine, PlannedStone, crossing, level, upright
 
-__all__ = ["ArchShape", "Opening", "plan_opening"]
-
 _CROWN = 0.3  # least thickness of an arch [m]
 _INTRADOS = 0.2  # length of a voussoir's face below, about [m]
 _JAMBS = (0.42, 0.62)  # short and long in turn, so that the jambs bond with the wall [m]

@@ -12,8 +12,6 @@ from synthetic.building import Draft, SyntheticBuilding, flat_stone, measured_bu
 from synthetic.buildings.walls import bed_heights
 from synthetic.frame import WallFrame, build_stone
 
-__all__ = ["SECOND", "corner"]
-
 SECOND = "second wall"
 """Name of the station from which the second wall was seen."""
 

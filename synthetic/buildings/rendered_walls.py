@@ -16,8 +16,6 @@ from survey.clouds.extras import optional
 from survey.geometry.polygons import ring_area
 from synthetic.rubble_wall import SIZE, make_rubble_wall
 
-__all__ = ["STYLES", "RenderedWall", "rasterised", "render_wall"]
-
 STYLES = ("ashlar", "coursed", "arch", "rubble")
 """Kinds of walls."""
 

@@ -36,8 +36,6 @@ from synthetic.bond import PlannedStone
 from synthetic.building import Draft, SolidDraft, SyntheticBuilding, measured_building, observer
 from synthetic.frame import TrueStone, WallFrame
 
-__all__ = ["WALL_RIB", "WEBS", "RibVaultShape", "SyntheticRibVault", "WebBed", "rib_vault", "vault_drafts"]
-
 WALL_RIB = 0.22
 """Width of wall ribs where a vault has them [m]."""
 WEBS = "NESW"

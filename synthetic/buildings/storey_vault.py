@@ -20,8 +20,6 @@ from survey.extrusion.extrusion import prism
 from synthetic.building import Draft, SolidDraft
 from synthetic.buildings.ribs import WALL_RIB, RibVaultShape, vault_drafts
 
-__all__ = ["PROJECTION", "STANDING", "StoreyVault", "plan_vault"]
-
 PROJECTION = 0.36
 """Distance to which corbels project from either wall, a little more than the springers that stand on them [m]."""
 STANDING = ("T1", "T4")

@@ -20,19 +20,6 @@ from synthetic.bond import Piece, upright
 from synthetic.buildings.storey_vault import PROJECTION
 from synthetic.frame import WallFrame
 
-__all__ = [
-    "FOOT",
-    "HALF",
-    "OTHER",
-    "THICKNESS",
-    "StoreyWall",
-    "corbel_pieces",
-    "corner_pieces",
-    "mirrored",
-    "storey_walls",
-    "through_pieces",
-]
-
 THICKNESS = 1.1
 """Thickness of the walls [m]."""
 HALF = 0.5 * THICKNESS

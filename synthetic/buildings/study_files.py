@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-__all__ = ["STUDIES", "study_text"]
-
 _FILE = """\
 # How probable is it that it falls, and what should be measured next? Explained in docs/howto/study.md.
 #   moma study {folder}/study.toml --db sqlite:///{folder}/{kind}.db --out {folder}/study

@@ -48,8 +48,6 @@ from synthetic.buildings.storey_walls import (
 from synthetic.buildings.walls import LaidCourse, plan_courses
 from synthetic.frame import Movement, build_stone
 
-__all__ = ["TowerStorey", "tower_storey"]
-
 _DEPTHS = {
     "bonder": THICKNESS,
     "header": 0.45,

@@ -12,9 +12,6 @@ from synthetic.bond import PlannedStone
 from synthetic.building import Draft, SyntheticBuilding, flat_stone, measured_building, observer
 from synthetic.frame import TrueStone, WallFrame
 
-__all__ = ["barrel_vault", "semicircular_arch"]
-
-
 _FOOT = np.array([14.2, 31.75, 5.6])  # of the axis in the site [m]
 _AZIMUTH = math.radians(23.0)  # of a vault's span, of an arch's face against the x axis
 _JITTER = 0.06  # largest deviation of head joints from a regular bond [m]

@@ -25,8 +25,6 @@ from synthetic.building import Draft, SyntheticBuilding, measured_building, obse
 from synthetic.buildings.openings import ArchShape, Opening, plan_opening
 from synthetic.frame import BATTER, Movement, build_stone, wall_frame
 
-__all__ = ["DEPTHS", "LaidCourse", "bed_heights", "plan_courses", "wall"]
-
 DEPTHS = {
     "header": 0.50,
     "jamb": 0.45,

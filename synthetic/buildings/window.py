@@ -18,8 +18,6 @@ from synthetic.bond import PlanLine, PlannedStone, crossing, fill, level, uprigh
 from synthetic.frame import TrueStone, WallFrame, build_stone, wall_frame
 from synthetic.measure import SIGMA, MeasuredStone, add_blunders, measure_stone
 
-__all__ = ["WindowBay", "make_window", "truth_text"]
-
 SEED = 2000
 BLUNDERS = 12  # points with a gross error
 SOURCE = "synthetic value, chosen for this sample"

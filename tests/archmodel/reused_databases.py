@@ -7,8 +7,6 @@ from archmodel.database.session import open_database
 from archmodel.tables.layout import SCHEMA_VERSION, metadata
 from tests.postgresql import Server
 
-__all__ = ["Recycled"]
-
 _TABLES = [table.name for table in metadata.sorted_tables if table.name != "moma_schema"]
 
 

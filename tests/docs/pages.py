@@ -15,8 +15,6 @@ from synthetic.__main__ import written
 from tests.moma.commands import prints
 from tests.paths import ROOT
 
-__all__ = ["blocks", "printed", "ran"]
-
 
 def blocks(page: str, language: str) -> list[str]:
     """The fenced blocks of a page in a language, in their order."""

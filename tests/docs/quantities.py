@@ -15,8 +15,6 @@ from pipelines.results.vtu import UnstructuredGrid
 from tests.paths import ROOT
 from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_body
 
-__all__ = ["PAGES", "with_tables"]
-
 Rows = list[Sequence[str]]
 
 PAGES = ("formats.md", "query.md", "runs.md")

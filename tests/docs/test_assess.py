@@ -5,10 +5,8 @@ import shlex
 
 import pytest
 
-from tests.docs.test_docs import ROOT, place
 from tests.moma.commands import prints
-
-__all__ = ["place"]
+from tests.paths import ROOT
 
 PAGE = "docs/howto/assess.md"
 

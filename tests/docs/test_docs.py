@@ -11,43 +11,18 @@ import pytest
 from tests.docs.pages import blocks, printed
 from tests.moma.commands import invoke
 from tests.paths import ROOT
-from tests.pipelines.scenes import small_geology
 
 PAGES = (
     "README.md",
     pytest.param("docs/howto/first-run.md", marks=pytest.mark.draws),
     "docs/howto/survey.md",
 )
-SCENE = "data/samples/window/window.toml"
 
 
 def commands(page):
     """The moma commands of a page, in order."""
     lines = [line.strip() for block in blocks(page, "bash") for line in block.splitlines()]
     return [shlex.split(line, comments=True) for line in lines if line.startswith("moma ")]
-
-
-@pytest.fixture
-def place(tmp_path):
-    """A folder in which the documentation's paths exist, with a scene that is quick to run."""
-    sample = tmp_path / "data/samples/window"
-    sample.mkdir(parents=True)
-    (sample / "window.moma").symlink_to(ROOT / "data/samples/window/window.moma")
-    (tmp_path / "docs/howto").mkdir(parents=True)
-    for folder in ("survey", "query", "assess"):
-        (tmp_path / "docs/howto" / folder).symlink_to(ROOT / "docs/howto" / folder)
-    (sample / "knowledge.toml").symlink_to(ROOT / "data/samples/window/knowledge.toml")
-    text = (ROOT / SCENE).read_text(encoding="utf-8")
-    assert 'default = "deformable"' in text
-    quick = text.replace('default = "deformable"', 'default = "rigid"').replace(
-        "[materials", 'where = ["course <= 3"]\n\n[materials', 1
-    )
-    (sample / "window.toml").write_text(quick, encoding="utf-8")
-    thrust = (ROOT / SCENE).with_name("thrust.toml").read_text(encoding="utf-8")
-    rigid = thrust.replace('default = "deformable"', 'default = "rigid"')
-    (sample / "thrust.toml").write_text(rigid, encoding="utf-8")
-    small_geology(tmp_path / "data/samples/geology")
-    return tmp_path
 
 
 def execute(arguments, folder):

@@ -11,8 +11,10 @@ from moma.cli import app
 from pipelines.results.summary import summarise
 from survey.formats.native import reader as moma_ascii
 from survey.formats.native.header import HeadReader
+from survey.formats.native.reader import with_header
 from survey.formats.native.stone import STONE_WORDS
-from survey.formats.reading import FORMATS, ReadingOptions, open_survey, with_header
+from survey.formats.options import ReadingOptions
+from survey.formats.reading import FORMATS, open_survey
 from survey.formats.tables.reader import NEEDED, OPTIONAL
 from survey.geometry.solids import Solid
 from survey.records.survey import Reject

@@ -6,9 +6,8 @@ from typer.testing import CliRunner
 from moma.cli import app
 from pipelines.tradeoff import study as trade_module
 from pipelines.tradeoff.grid import grid
-from tests.docs.test_docs import ROOT, commands, place
-
-__all__ = ["place"]
+from tests.docs.test_docs import commands
+from tests.paths import ROOT
 
 PAGES = sorted(path.relative_to(ROOT) for path in (ROOT / "docs/howto").glob("*.md"))
 

@@ -7,13 +7,10 @@ import pytest
 from moma import moma_solve
 from pipelines.record.export.export import ENDINGS
 from tests.docs.pages import blocks, ran
-from tests.docs.test_docs import place
 from tests.moma.commands import answer
 from tests.paths import ROOT
 from tests.pipelines.record.export.test_compas_solve import CUBE, PLATE, block, model_of, problem_of
 from tests.survey.formats.solids.test_lmgc90 import HEAD, body, polyhedron
-
-__all__ = ["place"]
 
 PAGE = "docs/howto/other-programs.md"
 

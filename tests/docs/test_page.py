@@ -3,9 +3,6 @@
 import pytest
 
 from tests.docs.pages import blocks, ran
-from tests.docs.test_docs import place
-
-__all__ = ["place"]
 
 PAGE = "docs/howto/page.md"
 

@@ -20,9 +20,9 @@ from pipelines.tradeoff.grid import grid
 from pipelines.tradeoff.pareto import front
 from pipelines.tradeoff.report import study_png
 from pipelines.tradeoff.study import TradeReport
-from tests.docs.test_docs import ROOT, SCENE, blocks, commands, place
-
-__all__ = ["place"]
+from tests.docs.pages import blocks
+from tests.docs.test_docs import commands
+from tests.paths import ROOT
 
 PAGE = "docs/howto/trade.md"
 STUDY = ROOT / "docs/howto/trade/window.json"
@@ -88,7 +88,7 @@ def test_a_study_of_the_sample_finds_the_quadratic_elements_worth_their_time(tmp
     url = f"sqlite:///{tmp_path / 'window.db'}"
     for line in (
         f"ingest {ROOT / 'data/samples/window/window.moma'} --db {url}",
-        f"trade {ROOT / SCENE} --db {url} --budget 10 --out {tmp_path / 'study'}",
+        f"trade {ROOT / 'data/samples/window/window.toml'} --db {url} --budget 10 --out {tmp_path / 'study'}",
     ):
         done = CliRunner().invoke(app, shlex.split(line))
         assert done.exit_code == 0, done.output

@@ -20,10 +20,10 @@ from mechanics.problem.problem import ContactProblem
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.law import STATE
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Placement, Scene, TimeSettings
-from mechanics.scene.shapes import drum, wall
+from mechanics.scene.shapes import BOX_FACES, drum, wall
 from mechanics.scene.state import State
 from mechanics.stones.materials import Material
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 LIMESTONE = Material("limestone", density=2000.0, young=1e9, poisson=0.2)
 TURN = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()

@@ -7,8 +7,6 @@ from typer.testing import CliRunner, Result
 
 from moma.cli import app
 
-__all__ = ["answer", "fails", "invoke", "prints"]
-
 
 def invoke(*words: object) -> Result:
     """Run a command, however it ends."""

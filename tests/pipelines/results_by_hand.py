@@ -4,9 +4,10 @@ import itertools
 
 import numpy as np
 
+from mechanics.dynamics.outcome import Outcome
 from mechanics.results.contact_result import ContactResult, JointResult
 from mechanics.results.postprocess import surface_polygons
-from mechanics.results.result import BodyResult, Energies, Errors, Frame, Outcome, Result, RunHistory
+from mechanics.results.result import BodyResult, Energies, Errors, Frame, Result, RunHistory
 from mechanics.results.stress_values import stress_values
 from mechanics.scene.scene import Block, Fidelity, Scene
 from mechanics.scene.shapes import BOX_FACES, box_corners

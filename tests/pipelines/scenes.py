@@ -13,8 +13,6 @@ from pipelines.run.assemble import Assembly, assemble
 from pipelines.scene.file import parse_scene
 from tests.paths import ROOT
 
-__all__ = ["TWO_COURSES", "TWO_COURSES_MIXED", "assembled", "fails_at_line", "small_geology", "survey_text"]
-
 # the two lowest courses of the sample, the first fixed
 TWO_COURSES = """
 [scene]

@@ -14,8 +14,6 @@ from functools import cache, partial
 from tests.mechanics.solvers.numbers import numbers
 from tests.paths import ROOT
 
-__all__ = ["FIGURES", "WORDS", "identifier", "parameters", "per_10_000"]
-
 PACKAGES = ("ground", "moma", "survey", "archmodel", "mechanics", "pipelines")
 # they name no thing of the field
 WORDS = {

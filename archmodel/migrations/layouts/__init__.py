@@ -2,5 +2,3 @@
 
 Public: `metadata` (version1).
 """
-
-__all__: list[str] = []

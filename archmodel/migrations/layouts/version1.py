@@ -17,8 +17,6 @@ from sqlalchemy import (
     text,
 )
 
-__all__ = ["TEXT", "metadata"]
-
 TEXT = String().with_variant(String(collation="C"), "postgresql")
 metadata = MetaData(naming_convention={"ix": "ix_%(column_0_label)s"})
 """All tables."""

@@ -3,5 +3,3 @@
 A script has `upgrade` and `downgrade` and, where the older layout holds less, `losses`: a function of the connection
 that describes what the way down drops.
 """
-
-__all__: list[str] = []

@@ -5,8 +5,6 @@ from sqlalchemy import insert
 
 from archmodel.migrations.layouts.version1 import metadata
 
-__all__ = ["depends_on", "down_revision", "downgrade", "revision", "upgrade"]
-
 revision = "0001"
 down_revision = None
 depends_on = None

@@ -31,17 +31,6 @@ from sqlalchemy.sql.expression import column
 
 from archmodel.migrations.layouts.version1 import TEXT, metadata
 
-__all__ = [
-    "credit_statements",
-    "depends_on",
-    "down_revision",
-    "downgrade",
-    "losses",
-    "revision",
-    "state_percentile",
-    "upgrade",
-]
-
 revision = "0002"
 down_revision = "0001"
 depends_on = None

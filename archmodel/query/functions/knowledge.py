@@ -22,18 +22,6 @@ from archmodel.tables.runs import MechanismStone
 from archmodel.tables.structures import Structure, structure_kind_named
 from ground.errors import QueryError, UsageError
 
-__all__ = [
-    "by",
-    "canonical",
-    "corrected",
-    "disputed",
-    "documented",
-    "has_mark",
-    "in_mechanism",
-    "is_a",
-    "observed",
-]
-
 MAX_SEVERITY = 4
 
 OPINIONS: Mapping[str, str] = {

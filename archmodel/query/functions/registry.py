@@ -12,8 +12,6 @@ from archmodel.query.functions import structures as whole
 from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES, Ask, Condition
 from archmodel.query.grammar import Call
 
-__all__ = ["FUNCTIONS", "STRUCTURE_FUNCTIONS", "Function"]
-
 Sql = Callable[[Any, Call, Ask], Condition]
 
 

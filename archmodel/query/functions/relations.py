@@ -14,8 +14,6 @@ from archmodel.query.tokens import Token
 from archmodel.tables.relations import SYMMETRIC, Membership, Relation
 from archmodel.tables.structures import Structure
 
-__all__ = ["load_path", "member_of", "part_of", "related", "with_parts"]
-
 Wanted = Callable[[ColumnElement[int]], Condition]
 
 

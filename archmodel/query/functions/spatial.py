@@ -8,8 +8,6 @@ from archmodel.query.names import campaign_named, stone_named
 from archmodel.query.scope import Scope
 from archmodel.query.tokens import complaint
 
-__all__ = ["moved_since", "within", "within_box"]
-
 
 def within(scope: Scope, call: Call, ask: Ask) -> Condition:
     """Test for a centroid near a stone, or near a place."""

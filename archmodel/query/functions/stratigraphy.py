@@ -25,8 +25,6 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 
-__all__ = ["contradicted", "in_time", "on_one_another"]
-
 Where = Scope | StructureScope
 
 

@@ -14,8 +14,6 @@ from archmodel.tables.opinions import DISPUTABLE
 from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 
-__all__ = ["changes", "disputed_structure", "has"]
-
 
 def has(scope: StructureScope, call: Call, ask: Ask) -> Condition:
     """Test for a stone among the members of a structure, or of its parts."""

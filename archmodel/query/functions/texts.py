@@ -15,8 +15,6 @@ from archmodel.tables.relations import Membership
 from archmodel.tables.structures import Structure
 from archmodel.tables.surveys import Measurement
 
-__all__ = ["text"]
-
 Has = Callable[..., Condition]
 """Test for the words in any of some columns."""
 

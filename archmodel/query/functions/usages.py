@@ -11,8 +11,6 @@ from archmodel.query.tokens import Token, complaint
 from archmodel.tables.knowledge import OBSERVATIONS
 from ground.errors import QueryError
 
-__all__ = ["MAX_METRES", "STRUCTURE_USAGES", "USAGES", "Ask", "Condition", "metres", "only", "tokens"]
-
 MAX_METRES = 1e9
 """Largest coordinate or distance in an expression [m]: its square is a number in every database."""
 

@@ -16,8 +16,6 @@ from mechanics.contact._kernels.vectors import (
     write_row,
 )
 
-__all__ = ["ball_points"]
-
 
 @njit(cache=True)
 def _onto_segment(c, a, b):

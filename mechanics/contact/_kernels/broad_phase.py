@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from mechanics.contact._kernels.vectors import row, write_row
 
-__all__ = ["Grid", "boxes", "close_pairs", "grid_of", "place", "points_of", "single_points"]
-
 _MANY_CELLS = 64  # a box that spans more cells than this is compared with all others instead
 
 

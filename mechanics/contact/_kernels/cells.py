@@ -5,8 +5,6 @@ from numba import njit
 
 from mechanics.contact._kernels.vectors import along, cross, dot, minus, norm, over, row
 
-__all__ = ["cell_points", "corner_points", "face_grid"]
-
 _EQUAL = 1.0 - 1e-6  # of lengths and areas that are equal but for rounding, the first counts [-]
 _WHOLE = 1e-6  # part of a cell that a face may be longer than whole cells [-]
 _NARROW = 0.25  # a cell of which the overlap reaches over less of its width belongs to its neighbour [-]

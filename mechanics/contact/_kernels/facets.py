@@ -12,17 +12,6 @@ from numba import njit
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = [
-    "QUADRATURE",
-    "FacetMeshes",
-    "corner_count",
-    "degree",
-    "hats",
-    "locate",
-    "rule_of",
-    "shape_functions",
-]
-
 
 class FacetMeshes(NamedTuple):
     """The meshes of all faces; mesh m owns nodes node_ptr[m]:node_ptr[m+1] and facets facet_ptr[m]:facet_ptr[m+1].

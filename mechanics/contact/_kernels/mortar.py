@@ -10,8 +10,6 @@ from mechanics.contact._kernels.facets import corner_count
 from mechanics.contact._kernels.overlap import FlatMesh, flattened, overlap_integrals, room
 from mechanics.contact._kernels.vectors import dot, minus, row
 
-__all__ = ["Bodies", "FacePairs", "mortar_rows"]
-
 _SLIVER = 1e-2  # a node whose share of the overlap is below this fraction of a neighbour's is merged into it
 
 

@@ -19,20 +19,6 @@ from mechanics.contact._kernels.vectors import (
     write_row,
 )
 
-__all__ = [
-    "MAX_CORNERS",
-    "NAME_BITS",
-    "SAME_PLANE",
-    "Pairs",
-    "Polygon",
-    "Polyhedra",
-    "clip",
-    "interface_points",
-    "point_areas",
-    "separating_axes",
-    "spread",
-]
-
 # Contact points are named by numbers below 2²⁷ within a pair of shapes: the kind of the pair, what the point is (a
 # corner of the incident face, a cut by a side of the reference face, a point inside, or the centroid or a corner
 # beside points inside), and a corner of one shape with a face of the other, or two edges. Shapes have at most a third

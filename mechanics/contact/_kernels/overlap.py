@@ -17,8 +17,6 @@ from mechanics.contact._kernels.facets import (
 )
 from mechanics.contact._kernels.vectors import column, dot, minus, row
 
-__all__ = ["FlatMesh", "flattened", "overlap_area", "overlap_integrals", "room"]
-
 _HATS = 0.8  # covered share of a facet up to which hats are used, which stay within the overlap
 _DUAL = 0.98  # covered share of a facet from which dual functions are used
 # share of a facet's area that rounding leaves as overlap where a joint ends at a node: it carries no pressure

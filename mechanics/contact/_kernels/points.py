@@ -6,8 +6,6 @@ from numba import njit
 from mechanics.contact._kernels.facets import corner_count, locate, shape_functions
 from mechanics.contact._kernels.vectors import cross, dot, minus, norm, over, row
 
-__all__ = ["surface_points"]
-
 
 @njit(cache=True)
 def _depth(corner, count, x, y):

@@ -7,8 +7,6 @@ component by component, and sums run from the first component to the last, so th
 import numpy as np
 from numba import njit
 
-__all__ = ["along", "column", "cross", "dot", "minus", "norm", "over", "row", "write_frame", "write_row"]
-
 
 @njit(cache=True)
 def row(matrix, k):  # pragma: no cover - compiled

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from mechanics.contact._kernels.vectors import cross, dot, minus, row, write_row
 from mechanics.delassus._kernels.sides import arm, inverse_columns, negative, side_jacobian, times, to_world
 
-__all__ = ["Pattern", "across", "assemble", "corrected", "inverses", "lift", "pushed", "softened"]
-
 
 class Pattern(NamedTuple):
     """Blocks (6, 6) of M + H Θ⁻¹ Hᵀ, bodies in elimination order.

@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["dissect"]
-
 # smallest share of the bodies on either side of a cut: where a wall narrows, an uneven cut is better
 _SIDE = 0.2
 

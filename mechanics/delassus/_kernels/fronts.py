@@ -6,8 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["Layout", "add_into", "solve"]
-
 
 class Layout(NamedTuple):
     """Order of elimination and places of the factors; the same for all matrices of one pattern.

@@ -10,8 +10,6 @@ from mechanics.contact._kernels.vectors import dot, minus, row
 from mechanics.delassus._kernels.sides import less_dot, negative
 from mechanics.problem._kernels import solve_contact
 
-__all__ = ["ELASTIC", "NONE", "RIGID", "Sides", "apply_delassus", "sweep"]
-
 NONE, RIGID, ELASTIC = 0, 1, 2
 
 

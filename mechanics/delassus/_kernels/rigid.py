@@ -19,17 +19,6 @@ from mechanics.contact._kernels.vectors import cross, dot, minus, row, write_row
 from mechanics.delassus._kernels.sides import add_dot, arm, less_dot, negative, to_world
 from mechanics.problem._kernels import LocalCompliance, plane_axes, slip
 
-__all__ = [
-    "Running",
-    "apply",
-    "diagonals",
-    "factors_of",
-    "relative_velocity",
-    "sweep",
-    "sweep_parallel",
-    "velocity_change",
-]
-
 
 class Running(NamedTuple):
     """State of the sweeps, kept up to date in place.

@@ -8,8 +8,6 @@ from numba import njit
 
 from mechanics.contact._kernels.vectors import cross, dot, row
 
-__all__ = ["add_dot", "arm", "inverse_columns", "less_dot", "negative", "side_jacobian", "times", "to_world"]
-
 
 @njit(cache=True)
 def add_dot(s, a, b):  # pragma: no cover - compiled

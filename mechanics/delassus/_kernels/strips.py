@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["cut"]
-
 
 @njit(cache=True)
 def cut(bodies, moving, parts, along):  # pragma: no cover - compiled

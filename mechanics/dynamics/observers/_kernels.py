@@ -6,8 +6,6 @@ Corners of body b are first[b]:first[b + 1].
 import numpy as np
 from numba import njit
 
-__all__ = ["largest_displacement", "largest_speed"]
-
 
 @njit(cache=True)
 def largest_displacement(

@@ -6,8 +6,6 @@ from mechanics.arrays import Array
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["elastic_energy", "kinetic_energy", "mass_norm"]
-
 
 def kinetic_energy(model: Model, state: State) -> float:
     """Return ½ vᵀ M v of all bodies that can move [J]."""

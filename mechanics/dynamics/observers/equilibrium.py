@@ -10,18 +10,6 @@ from mechanics.dynamics.observers._kernels import largest_displacement, largest_
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = [
-    "Support",
-    "displacement",
-    "imbalance",
-    "seen_from_supports",
-    "settlement",
-    "speed",
-    "support_reaction",
-    "tilt",
-    "wrenches",
-]
-
 
 @dataclass(frozen=True)
 class Support:

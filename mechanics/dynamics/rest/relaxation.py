@@ -9,8 +9,6 @@ from mechanics.dynamics.observers.energy import kinetic_energy
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["Relaxation", "halted", "relaxation_caution"]
-
 
 class Relaxation(Carrier):
     """Kinetic damping: all bodies are halted each time their kinetic energy has passed a peak (Cundall 1976).

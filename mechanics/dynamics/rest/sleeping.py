@@ -22,9 +22,6 @@ from mechanics.dynamics.warm_start import Memory
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["Sleepers"]
-
-
 _STEPS = 50  # steps over which a stone must rest before it falls asleep
 _CALMER = 0.5  # imbalance below which a stone falls asleep, over that from which it is woken [-]: no flutter
 _RINGS = 2  # rings of stones that wake around one that wakes; doubled each time that they do not suffice

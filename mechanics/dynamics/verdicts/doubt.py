@@ -7,9 +7,6 @@ from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.problem.residual import residual
 
-__all__ = ["UnsolvedSteps", "length"]
-
-
 _DOUBT = 0.5  # velocity that unsolved steps may have added, over that of a proven motion [-]
 _HOPELESS = 20  # steps without a solution from which a run is given up: overlaps are pushed out in fewer
 _NAMED = 4  # most stones that are named

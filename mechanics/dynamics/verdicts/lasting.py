@@ -11,9 +11,6 @@ from mechanics.dynamics.step import Step
 from mechanics.model.model import Model
 from mechanics.scene.state import State
 
-__all__ = ["LASTING", "balance_of", "disproof", "fall_speed", "moves", "rest_speed", "rests"]
-
-
 LASTING = 5
 """Steps in a row that must be in balance."""
 

@@ -21,9 +21,6 @@ from mechanics.model.model import Model
 from mechanics.scene.laws.law import BOND
 from mechanics.scene.state import State
 
-__all__ = ["MOVED", "Verdict", "Watch"]
-
-
 MOVED = 0.01  # displacement over a stone's width from which it does not stand as it is drawn [-]
 _FALL_SPEED = 0.05  # of the same speed, above which a body falls [-]
 _TOPPLED = np.pi / 4  # tilt from which a stone at rest away from its place has toppled [rad]

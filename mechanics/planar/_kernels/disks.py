@@ -8,8 +8,6 @@ from numba import njit
 from mechanics.arrays import Array, Bools
 from mechanics.planar._kernels.grid import bucket
 
-__all__ = ["FACE", "Disks", "GapWatch", "find_disks", "longer", "sort_contacts"]
-
 # feature 0 of a contact: on the face of both bodies; 1 and 2 are the ends of a wall
 FACE = 0
 

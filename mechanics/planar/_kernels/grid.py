@@ -12,8 +12,6 @@ from numba import njit
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["DiskGrid", "bucket", "build_grid", "cells_along"]
-
 # half width over the mean up to which disks are in the class of the mean
 _SIMILAR = 1.25
 # width of a cell over the half width of a disk; a little more than two, so that rounding cannot put two disks in reach

@@ -12,8 +12,6 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["LANES", "solve_disks"]
-
 LANES = 8
 
 _DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(64)

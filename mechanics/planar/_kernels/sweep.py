@@ -19,19 +19,6 @@ from numpy.typing import NDArray
 
 from mechanics.planar._kernels.lanes import LANES, solve_disks
 
-__all__ = [
-    "SweepOrder",
-    "apply",
-    "diagonals",
-    "layout_of",
-    "records",
-    "relative_velocity",
-    "solve_local",
-    "sweep",
-    "sweep_parallel",
-    "velocity_change",
-]
-
 # columns of a record: n (2), κ ℓ_t of both sides, shift (2), μ, k, r (2), 1/W_NN, 1/W_TT
 _LT_I, _LT_J, _SHIFT, _MU, _K, _R, _INV_NN, _INV_TT, _COLUMNS = 2, 3, 4, 6, 7, 8, 10, 11, 12
 # contacts searched for those of a group

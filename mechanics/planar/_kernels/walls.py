@@ -9,8 +9,6 @@ from mechanics.arrays import Array, Ints
 from mechanics.planar._kernels.disks import FACE, longer
 from mechanics.planar._kernels.grid import cells_along
 
-__all__ = ["EndNeighbours", "end_neighbours", "find_walls"]
-
 _BEND = 1e-9  # sine of the angle from which two walls form a bend
 
 

@@ -10,8 +10,6 @@ from scipy.spatial import cKDTree
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.planar.measures.surface import profile
 
-__all__ = ["Blocks", "blocks_of"]
-
 _SEVERAL = 5  # disks of a block, at least; fewer are debris
 _HEIGHT_ROUNDING = 1e-9  # of the height of a disk's top, over its radius [-]
 

@@ -7,8 +7,6 @@ import numpy as np
 from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 
-__all__ = ["Cell", "Shape", "layer_members", "members", "shape_of"]
-
 _MIN_CELL_DISKS = 5  # disks of a cell: fewer have no mean deformation
 
 

@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.planar.measures.tessellation import Tessellation
 
-__all__ = ["Fabric", "fabric_of"]
-
 _BEARS = 1e-9  # of the mean force, that a contact bears [-]
 
 

@@ -7,8 +7,6 @@ from scipy.stats import theilslopes
 
 from mechanics.arrays import Array, Bools
 
-__all__ = ["ShearLimits", "crest_radius", "shear_limits"]
-
 RIGID = 0.95
 """Share of the slip, along the fault, above which a disk moves with the hanging wall [-]."""
 RESTING = 0.05

@@ -8,8 +8,6 @@ from ground.errors import SceneError
 from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.tessellation import tessellation
 
-__all__ = ["sides_of"]
-
 _TOUCHES = (
     0.1  # distance from the lowest or highest point of the sample, over the smallest radius, at a platen [-]
 )

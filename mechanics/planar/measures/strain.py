@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.measures.tessellation import Tessellation
 
-__all__ = ["DiskDeformation", "deformation"]
-
 
 @dataclass(frozen=True)
 class DiskDeformation:

@@ -6,8 +6,6 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["Stress", "mean_stress", "moments"]
-
 
 @dataclass(frozen=True)
 class Stress:

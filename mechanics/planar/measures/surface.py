@@ -4,8 +4,6 @@ import numpy as np
 
 from mechanics.arrays import Array
 
-__all__ = ["front", "profile", "rise", "slope"]
-
 _STEPS = 10  # places at which the surface is looked up in each part of its length, over which it is averaged
 
 

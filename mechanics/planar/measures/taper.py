@@ -13,8 +13,6 @@ from scipy.optimize import brentq
 
 from ground.errors import SceneError
 
-__all__ = ["critical_slope"]
-
 
 def critical_slope(internal: float, basal: float, base_slope: float = 0.0) -> float:
     """Return the least surface slope α with which a wedge slides on its base without deforming within [rad].

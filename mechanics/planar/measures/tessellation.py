@@ -7,8 +7,6 @@ from scipy.spatial import Delaunay
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = ["Tessellation", "corner_areas", "tessellation"]
-
 _GAP = 2.0  # free distance between two disks, over the mean radius, from which they have nothing between them [-]
 
 

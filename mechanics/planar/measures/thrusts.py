@@ -8,8 +8,6 @@ from scipy.signal import find_peaks
 
 from mechanics.arrays import Array
 
-__all__ = ["Thrusts", "thrusts_of"]
-
 _COLUMN = 4.0  # width of a column of the layer, over the mean radius [-]
 _SMOOTH = 3  # columns of a running mean
 _PROMINENT = 0.25  # of the largest shear of a column, by which a band exceeds what is beside it [-]

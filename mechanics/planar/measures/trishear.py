@@ -17,8 +17,6 @@ from scipy.optimize import least_squares
 
 from mechanics.arrays import Array
 
-__all__ = ["Trishear", "TrishearFit", "trishear_fit"]
-
 _INCREMENTS = 100  # of the slip, in which places are carried along
 _HALF_ANGLES = np.radians([10.0, 20.0, 30.0, 45.0, 60.0])  # from which fits start [rad]
 _RATIOS = (0.0, 1.0, 2.0, 4.0)  # P/S from which fits start [-]

@@ -8,8 +8,6 @@ from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.limits import RESTING, RIGID
 from mechanics.planar.measures.trishear import Trishear, TrishearFit
 
-__all__ = ["TrishearGain", "trishear_gain"]
-
 _HALF_ANGLES = np.radians(np.arange(2.5, 61.0, 2.5))  # that are compared with the fit [rad]
 _RATIOS = np.array(
     [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0]

@@ -19,8 +19,6 @@ from mechanics.results.forecast.cost_rates import CALIBRATION, MEMORY, RATES
 from mechanics.results.forecast.plan import Amounts, Plan
 from mechanics.scene.scene import Scene, Start, TimeSettings
 
-__all__ = ["ExpectedCost", "calibration", "expected_cost", "machine_slowness", "measures"]
-
 # least, likely and largest number of steps:
 _RESTING = (5, 6, 40)  # from an equilibrium: the steps in which it must last, and the one that finds it
 _RELAXING = (5, 20, 80)  # of a kinetic relaxation

@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["CALIBRATION", "MACHINE", "MEMORY", "RATES", "Rate"]
-
 
 @dataclass(frozen=True)
 class Rate:

@@ -17,9 +17,6 @@ from mechanics.scene.scene import Fidelity, Scene
 from mechanics.scene.state import State
 from mechanics.stones.meshing.quality import MeshReport
 
-__all__ = ["Amounts", "Plan", "loose_blocks", "plan"]
-
-
 _NUMBER = 8  # size of a floating-point number [bytes]
 _SHUT = 1e-6  # gap over the smaller stone's width that rounding leaves of a closed joint [-]
 _CONTACT_NUMBERS = 80  # numbers kept for each contact point: frame, arms, impulses, its part of W, and copies

@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Bools
 from mechanics.scene.laws.law import BOND, REST, Approach
 
-__all__ = ["BROKEN", "WHOLE", "bonded", "with_bonds"]
-
 # values of the internal variable BOND; between 0 and WHOLE: damaged
 WHOLE, BROKEN = 1.0, -1.0
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from mechanics.arrays import Array
 
-__all__ = ["FLOOR", "Closure"]
-
 FLOOR = 1e-2
 """Pressure over the reference pressure below which the stiffness of a joint stays the same [-]."""
 

@@ -13,8 +13,6 @@ from mechanics.scene.laws.law import BOND, OPENING, REST, SLIDING, SLIP, Approac
 from mechanics.scene.laws.mortar import MortarJoint, held_tension
 from mechanics.stones.settings import check_settings
 
-__all__ = ["CohesiveZone"]
-
 
 @dataclass(frozen=True)
 class CohesiveZone(Joint):

@@ -11,8 +11,6 @@ from mechanics.arrays import Array, Bools
 from mechanics.scene.laws.law import REST, SLIDING, Approach, Joint, Terms
 from mechanics.stones.settings import check_settings
 
-__all__ = ["DryJoint", "DynamicFriction", "Friction", "at_limit", "gap_bias", "slid"]
-
 Friction = Annotated[float, Setting("Coulomb's coefficient μ.", "-", at_least=0)]
 DynamicFriction = Annotated[
     float | None,

@@ -31,8 +31,6 @@ from mechanics.scene.laws.law import (
 from mechanics.scene.laws.mortar import MortarJoint, check_tension
 from mechanics.stones.settings import check_settings
 
-__all__ = ["ElasticJoint"]
-
 _WHERE = "elastic joint"
 _AT_STRENGTH = 1e-8  # part of the strength by which a pressure at it may differ [-]
 _ANY = 1.0  # thickness for those who ask for the strength of mortar alone, where none is known [m]

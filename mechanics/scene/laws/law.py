@@ -15,24 +15,6 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = [
-    "BOND",
-    "CRUSHED",
-    "ENERGY",
-    "OPENING",
-    "REST",
-    "SLIDING",
-    "SLIP",
-    "SPRING",
-    "STATE",
-    "Approach",
-    "Joint",
-    "Law",
-    "Springs",
-    "Terms",
-]
-
-
 # columns of the internal variables that a contact carries from step to step
 BOND, SLIDING, OPENING, SLIP, REST = range(5)
 SPRING = slice(5, 8)

@@ -11,8 +11,6 @@ from mechanics.scene.laws.dry_joint import DryJoint, Friction
 from mechanics.scene.laws.law import Approach, Joint, Terms
 from mechanics.stones.settings import check_settings
 
-__all__ = ["LennardJones"]
-
 
 @dataclass(frozen=True)
 class LennardJones(Joint):

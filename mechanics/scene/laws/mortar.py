@@ -13,9 +13,6 @@ from mechanics.scene.laws.dry_joint import DryJoint, DynamicFriction, Friction, 
 from mechanics.scene.laws.law import BOND, REST, SLIDING, SLIP, Approach, Joint, Law, Terms
 from mechanics.stones.settings import check_settings
 
-__all__ = ["MortarJoint", "check_tension", "held_tension"]
-
-
 # a bond at its limit has broken
 _OPENED = 1e-6  # in tension, when it is open by this part of a body's size [-]
 _CREPT = 1e-3  # in shear, when it has crept by this part [-], or slides faster than solvers let it drift

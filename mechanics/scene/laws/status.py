@@ -7,9 +7,6 @@ from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import at_limit
 from mechanics.scene.laws.law import BOND, CRUSHED, Terms
 
-__all__ = ["STATUSES", "contact_status"]
-
-
 STATUSES = ("open", "stick", "slip", "bonded", "broken", "crush")
 
 

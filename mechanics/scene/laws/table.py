@@ -9,8 +9,6 @@ import numpy as np
 from mechanics.arrays import Array, Bools, Ints
 from mechanics.scene.laws.law import Approach, Law, Springs, Terms
 
-__all__ = ["LawTable", "law_table"]
-
 _PER_CONTACT = ("gap", "speed", "slide", "area", "size", "compliance", "state", "pair", "first")
 _IF_KNOWN = ("thickness", "crushing")
 _NUMBERS = ("bias", "friction", "cohesion", "adhesion")

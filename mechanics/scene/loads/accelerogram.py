@@ -8,8 +8,6 @@ import numpy as np
 from ground.errors import SceneError
 from mechanics.arrays import Array
 
-__all__ = ["Accelerogram", "Direction"]
-
 Direction = tuple[float, float, float]
 """Direction (east, north, up) of a component."""
 

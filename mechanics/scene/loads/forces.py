@@ -12,8 +12,6 @@ from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.validation import finite, refuse_unless
 
-__all__ = ["StoneForce"]
-
 
 @dataclass(frozen=True)
 class StoneForce:

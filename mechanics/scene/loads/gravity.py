@@ -13,8 +13,6 @@ from mechanics.scene.loads.load import Course
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.settings import check_settings
 
-__all__ = ["GravityRamp", "TiltingTable"]
-
 
 @dataclass(frozen=True)
 class GravityRamp:

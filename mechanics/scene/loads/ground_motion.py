@@ -12,8 +12,6 @@ from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
 
-__all__ = ["Component", "GroundMotion", "braking_time"]
-
 _BRAKING = 0.1  # deceleration after a record over its peak, too little to shake a stone by itself [-]
 
 

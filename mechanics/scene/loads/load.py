@@ -13,8 +13,6 @@ import numpy as np
 
 from mechanics.arrays import Array
 
-__all__ = ["Course", "Force", "GravityChange", "Loads", "Motion", "Pose"]
-
 _STRONG = 0.95  # of the integral of the square, at which strong motion ends by its usual definition (Trifunac 1975) [-]
 _SAMPLES = 1000  # instants beside those given, so that long pieces are integrated too
 _TIME_ROUNDING = 1e-9  # of an instant, by which rounding may place the end of a run before it [-]

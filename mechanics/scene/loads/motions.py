@@ -13,8 +13,6 @@ from mechanics.scene.loads.load import Course, Pose
 from mechanics.scene.loads.time_series import History
 from mechanics.stones.validation import finite
 
-__all__ = ["ImposedMotion", "settlement", "spreading"]
-
 Vector = tuple[float, float, float]
 
 

@@ -10,19 +10,9 @@ import numpy as np
 from ground.errors import SceneError
 from mechanics.arrays import Array
 from mechanics.scene.loads.accelerogram import Accelerogram, Direction
-from mechanics.scene.loads.record_formats import UNITS, direction_of, read_at2, reader_of, unit_of
+from mechanics.scene.loads.record_formats import UNITS, direction_of, reader_of, unit_of
 from mechanics.scene.loads.tables import Table, fail_at, numbered_lines, read_table
 from mechanics.scene.loads.waveforms import is_waveform, read_waveforms
-
-__all__ = [
-    "UNITS",
-    "read_accelerogram",
-    "read_accelerograms",
-    "read_at2",
-    "read_csv",
-    "read_station",
-    "unit_of",
-]
 
 _UNEVEN = 0.1  # largest deviation of the times of a table from equal steps, of a step [-]: tables round them
 _TIMES = ("t", "time", "times", "zeit", "temps", "tempo", "tiempo", "s", "sec", "seconds")

@@ -16,8 +16,6 @@ from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram, Direction
 from mechanics.scene.loads.tables import fail_at, number_at, numbered_lines
 
-__all__ = ["UNITS", "direction_of", "read_at2", "read_esm", "read_knet", "read_smc", "reader_of", "unit_of"]
-
 UNITS = {"g": 9.80665, "m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 1e-3, "%g": 0.0980665}
 """Sizes of the units of acceleration [m/s²]; each may be spelt as `unit_of` reads it."""
 

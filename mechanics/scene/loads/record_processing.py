@@ -11,8 +11,6 @@ import numpy as np
 from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram
 
-__all__ = ["band_pass", "without_drift"]
-
 
 def without_drift(record: Accelerogram, degree: int = 6) -> Accelerogram:
     """Remove the drift that results from integrating a wrong baseline.

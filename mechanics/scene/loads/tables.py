@@ -18,8 +18,6 @@ from ground.tables.table import read_table as read_rows
 from mechanics.arrays import Array, Ints
 from mechanics.scene.loads.time_series import History
 
-__all__ = ["Table", "fail_at", "number_at", "numbered_lines", "read_columns", "read_history", "read_table"]
-
 
 @dataclass(frozen=True)
 class Table:

@@ -10,9 +10,6 @@ from numpy.typing import ArrayLike
 from ground.errors import SceneError
 from mechanics.arrays import Array
 
-__all__ = ["History", "Outside"]
-
-
 _TIME_ROUNDING = 1e-9  # of its span, by which rounding may place a time outside a history that ends [-]
 
 

@@ -8,8 +8,6 @@ from ground.errors import SceneError
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.record_formats import direction_of
 
-__all__ = ["is_waveform", "read_waveforms"]
-
 _ENDINGS = (".mseed", ".miniseed", ".ms", ".msd", ".sac", ".seed")
 _TABLES = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\xff\xfe", b"\xfe\xff")  # workbooks, UTF-16
 

@@ -30,36 +30,6 @@ from mechanics.solvers._kernels.body_cholesky import Panels, backward, forward
 from mechanics.solvers._kernels.body_parts import Parts
 from mechanics.solvers.scales import ROUNDING
 
-__all__ = [
-    "ADHESION",
-    "ARM",
-    "BLOCK",
-    "COHESION",
-    "FRICTION",
-    "ROWS",
-    "SHARE",
-    "SHIFT",
-    "SOFT",
-    "YIELD",
-    "Acceleration",
-    "Factors",
-    "Iterate",
-    "Runs",
-    "Touching",
-    "advance",
-    "assemble",
-    "begin",
-    "between",
-    "broken_laws",
-    "down",
-    "masses",
-    "packed",
-    "projected",
-    "to_local",
-    "to_world",
-    "up",
-]
-
 # places of a block: a multiple of what a processor multiplies at once, so few that a block stays in the fastest memory
 BLOCK = 64
 # rows of a block of a field, and where the vectors and numbers of contacts begin

@@ -23,20 +23,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = [
-    "AT_ONCE",
-    "Panels",
-    "backward",
-    "divide",
-    "eliminate",
-    "finish",
-    "forward",
-    "panels_of",
-    "postorder",
-    "reduce",
-    "solve",
-]
-
 # rows of a panel that are finished, while other threads wait, before they are taken from the others by one product
 AT_ONCE = 48
 # bodies above which a product is faster than line by line

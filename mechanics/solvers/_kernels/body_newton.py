@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from mechanics.contact._kernels.vectors import dot, row, write_row
 from mechanics.delassus._kernels.sides import add_dot, inverse_columns, negative, side_jacobian, times
 
-__all__ = ["BodyBlocks", "alart_curnier", "body_load", "body_matrix", "contact_step", "inverse_blocks"]
-
 
 class BodyBlocks(NamedTuple):
     """Blocks of the bodies' equations, 3 × 3 in rows of translation and rotation of each body that moves.

@@ -10,8 +10,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["Parts", "parts_of"]
-
 # numbers of the factors that lie between the parts, over all of them, at most [-]
 _BETWEEN = 0.1
 # parts, at most

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from mechanics.problem._kernels import onto_cone
 from mechanics.solvers._kernels.body_cholesky import Panels, solve
 
-__all__ = ["DiskFactors", "DiskIterate", "DiskTouching", "advance_disks", "assemble_disks"]
-
 
 class DiskTouching(NamedTuple):
     """Contacts of the plane as the iteration sees them.

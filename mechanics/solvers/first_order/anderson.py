@@ -5,8 +5,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.solvers.scales import ROUNDING
 
-__all__ = ["Anderson"]
-
 
 class Anderson:
     """Extrapolation from the last iterates of x ← G(x).

@@ -26,9 +26,6 @@ from mechanics.solvers._kernels.body_parts import Parts, parts_of
 from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import LOOK, MANY, OVERSHOOT, ROUNDING, SPARE
 
-__all__ = ["RESTING", "SORTED", "STEADY", "BodyADMM", "Stage"]
-
-
 # velocities of a body
 _VELOCITIES = 6
 # iterates from which is extrapolated, at most

@@ -16,8 +16,6 @@ from mechanics.scene.threads import at_once
 from mechanics.solvers._kernels import body_cholesky as kernel
 from mechanics.solvers._kernels.body_parts import Parts
 
-__all__ = ["factorise"]
-
 _Each = Callable[..., Iterable[bool | None]]
 
 

@@ -18,9 +18,6 @@ from mechanics.solvers._kernels import disk_admm as kernel
 from mechanics.solvers.first_order.body_factors import factorise
 from mechanics.solvers.scales import FOLLOWING, OVERSHOOT, PLAIN_LOOK, SPARE
 
-__all__ = ["DiskADMM"]
-
-
 # velocities of a body
 _VELOCITIES = 3
 

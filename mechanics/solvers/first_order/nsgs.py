@@ -8,9 +8,6 @@ from mechanics.problem.residual import Residual, project_on_cone, residual
 from mechanics.solvers.first_order.anderson import Anderson
 from mechanics.solvers.scales import LOOK
 
-__all__ = ["NSGS"]
-
-
 # η of an extrapolation over that of the sweeps above which it is dropped, with the old iterates: one that looks worse
 # at first mostly leads on [-]
 _BAD = 10.0

@@ -8,8 +8,6 @@ from mechanics.delassus.compliant import simplified
 from mechanics.problem.problem import ContactProblem, ContactSolution, ContactStart
 from mechanics.solvers.first_order.body_admm import BodyADMM
 
-__all__ = ["StonesAsRigid"]
-
 
 @dataclass(frozen=True)
 class StonesAsRigid:

@@ -31,9 +31,6 @@ from mechanics.solvers.second_order.second_order_cones import (
     to_bounds,
 )
 
-__all__ = ["NAME", "CentralPath"]
-
-
 NAME = "interior point"
 """Method in the messages of errors."""
 

@@ -11,9 +11,6 @@ from mechanics.problem.residual import Residual, residual
 from mechanics.solvers.second_order.central_path import NAME, CentralPath
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["InteriorPoint"]
-
-
 # complementarity, relative to typical impulses, at which a path begins near the impulses of a start: those of the step
 # before cost 10 iterations at 1e-4, 13 at 1e-2 and 15 at 1e-6 [-]
 _START_COMPLEMENTARITY = 1e-4

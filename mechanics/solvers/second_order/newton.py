@@ -20,9 +20,6 @@ from mechanics.solvers.scales import HELD, ROUNDING
 from mechanics.solvers.second_order.newton_equations import Equations, equations_of
 from mechanics.solvers.second_order.scaling import equilibrated
 
-__all__ = ["Newton"]
-
-
 # α over η and the scale of W, at first and at least: α falls with η, so convergence stays fast (Fan & Yuan 2005) [-]
 _SHARE = 0.1
 # η above which a start is far from a solution, and the contacts that bear are held first [-]

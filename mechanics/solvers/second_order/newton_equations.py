@@ -24,9 +24,6 @@ from mechanics.solvers._kernels import body_newton as bodies
 from mechanics.solvers.scales import ROUNDING
 from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
 
-__all__ = ["Equations", "equations_of"]
-
-
 # error of the equations of bodies that deform over their right side: Newton's steps correct it [-]
 _INEXACT = 1e-2
 # most products with W for them

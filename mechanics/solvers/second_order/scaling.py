@@ -16,8 +16,6 @@ from mechanics.arrays import Array
 from mechanics.problem.problem import ContactProblem
 from mechanics.solvers.scales import ROUNDING
 
-__all__ = ["equilibrated"]
-
 
 def equilibrated(problem: ContactProblem) -> tuple[ContactProblem, Array]:
     """Return the problem in r̂, and D (nc,), in √kg.

@@ -7,9 +7,6 @@ import numpy as np
 from ground.errors import SolverError
 from mechanics.arrays import Array
 
-__all__ = ["Scaling", "central", "divide", "product", "reach", "scaling", "tangential", "to_bounds"]
-
-
 _MIRROR = np.array([1.0, -1.0, -1.0])
 
 

@@ -10,8 +10,6 @@ from mechanics.problem.problem import ContactProblem, ContactSolution, ContactSt
 from mechanics.solvers.scales import HELD
 from mechanics.solvers.second_order.newton import Newton
 
-__all__ = ["SofterJoints"]
-
 
 @dataclass(frozen=True)
 class SofterJoints:

@@ -6,8 +6,6 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["SparseBlocks"]
-
 
 class SparseBlocks:
     """Pattern of a matrix of 3 × 3 blocks whose structure is symmetric, and its latest factors.

@@ -13,9 +13,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.shape_functions import Integration, integration
 
-__all__ = ["MASS_ORDER", "STIFFNESS_ORDER", "ElasticOperators", "elastic_operators", "node_volumes"]
-
-
 # Polynomial order of the integrand. The Jacobian is constant in a tetrahedron, of order 2 in each direction in a
 # hexahedron. M and the forces of the patch test, Jacobian times shape function gradients, are exact.
 STIFFNESS_ORDER = {

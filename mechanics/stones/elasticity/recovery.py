@@ -11,9 +11,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.shape_functions import integration
 
-__all__ = ["recovery"]
-
-
 _UNSEEN = (
     0.03  # variance of a direction or quadratic term, over the largest, below which a patch leaves it out
 )

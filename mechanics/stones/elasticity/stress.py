@@ -9,9 +9,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.shape_functions import Integration, integration
 
-__all__ = ["SAMPLE_ORDER", "sampled_stress", "stress_error"]
-
-
 # order of the rule with the best stress at its points: centroid, four points of a tetrahedron, 2 × 2 × 2 (Barlow 1976)
 SAMPLE_ORDER = {Element.TET4: 1, Element.TET10: 2, Element.HEX8: 1, Element.HEX20: 3, Element.HEX27: 3}
 

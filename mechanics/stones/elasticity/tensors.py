@@ -4,8 +4,6 @@ import numpy as np
 
 from mechanics.arrays import Array
 
-__all__ = ["from_voigt", "principal", "to_voigt", "von_mises"]
-
 
 def von_mises(stress: Array) -> Array:
     """Return σ_vm = sqrt(½[(σxx-σyy)²+(σyy-σzz)²+(σzz-σxx)²] + 3(σxy²+σyz²+σzx²)) of stress (…, 6) [Pa].

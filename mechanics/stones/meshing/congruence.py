@@ -11,8 +11,6 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 
-__all__ = ["Congruence", "classes", "motion", "translation"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 _EQUAL = 1e-11  # distance of two corners that are the same, over the stone's size

@@ -3,8 +3,6 @@
 from enum import StrEnum
 from functools import cache
 
-__all__ = ["Element"]
-
 # corners of the edges, of the quadrilateral sides and of the boundary facets, in VTK's order
 _TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))

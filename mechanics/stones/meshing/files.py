@@ -21,8 +21,6 @@ from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import VolumeMesh
 
-__all__ = ["check_mesh_file", "read_meshes", "write_meshes"]
-
 _ALL = frozenset(Element)
 _NAMED_BY_MESHIO = {
     Element.TET4: "tetra",

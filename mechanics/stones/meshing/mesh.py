@@ -10,8 +10,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.shape_functions import integration, jacobians
 from mechanics.stones.polyhedra import face_plane, face_planes, mass_properties
 
-__all__ = ["SolidMesh", "VolumeMesh", "boundary_facets", "solid_mesh", "tet_mesh", "with_middle_nodes"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 _OFF_FACE = 1e-6  # largest distance of a boundary facet from the stone's face, over the stone's size

@@ -11,9 +11,6 @@ from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh
 
-__all__ = ["MeshQuality", "MeshReport", "StoneMesh", "cell_quality", "mesh_quality"]
-
-
 _BATCH = 100_000  # cells computed at once: some 30 MB for each of a few arrays
 
 

@@ -14,9 +14,6 @@ from skfem.quadrature import get_quadrature
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 
-__all__ = ["Integration", "Tabulated", "integration", "jacobians", "reference_points", "tabulated"]
-
-
 _SKFEM = {
     Element.TET4: skfem.ElementTetP1,
     Element.TET10: skfem.ElementTetP2,

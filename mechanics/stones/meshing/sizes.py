@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.stones.polyhedra import face_plane
 
-__all__ = ["SizeField", "as_field", "graded"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 

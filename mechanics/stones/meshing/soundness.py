@@ -6,8 +6,6 @@ from ground.errors import GeometryError, MeshError
 from mechanics.arrays import Array, Bools
 from mechanics.stones.polyhedra import face_plane, face_planes, fan, mass_properties
 
-__all__ = ["CONVEX", "check_meshable", "is_convex"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 # fractions of a stone's size

@@ -7,8 +7,6 @@ if TYPE_CHECKING:
     from pipelines.assess.compare import SurveyComparison
     from pipelines.assess.pushover.push import Pushed
 
-__all__ = ["assessment_lines", "comparison_lines", "pushover_lines"]
-
 _MAX_STONES = 6  # stones of a mechanism that are named without -v
 _COURSES = 5  # courses with the largest misfits that are listed without -v
 

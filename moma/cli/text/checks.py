@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     from pipelines.run.check_report import CheckReport, Cost, MeshQualityReport
     from pipelines.run.closing_check import GapPlace, JointsReport, SimplificationReport
 
-__all__ = ["check_lines", "duration"]
-
 _SHOWN = 5
 """Number of stones and places listed without -v."""
 

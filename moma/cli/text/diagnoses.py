@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pipelines.assess.diagnosis.diagnose import Diagnosis
 
-__all__ = ["diagnosis_lines"]
-
 
 def diagnosis_lines(done: "Diagnosis", verbose: bool) -> list[str]:
     """Return the lines of a diagnosis: its verdict, the date with its evidence, and the hypotheses in their order."""

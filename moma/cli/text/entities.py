@@ -5,8 +5,6 @@ from typing import Any
 
 from moma.cli.text.formats import as_lines
 
-__all__ = ["entity_lines", "history_lines"]
-
 Values = Mapping[str, Any]
 
 

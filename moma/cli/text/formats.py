@@ -8,18 +8,6 @@ from typing import Any
 from archmodel.quantities import units_of
 from archmodel.store.run_record import without_rounding
 
-__all__ = [
-    "USUAL_COLUMNS",
-    "as_csv",
-    "as_geojson",
-    "as_json",
-    "as_lines",
-    "as_table",
-    "shorten",
-    "shown_columns",
-    "some",
-]
-
 USUAL_COLUMNS = (
     "code", "kind", "course", "depth", "length", "height", "volume", "rms", "rejected", "fidelity", "von_mises_p99",
     "displacement_max",

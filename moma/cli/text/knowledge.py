@@ -6,8 +6,6 @@ if TYPE_CHECKING:
     from archmodel.store.revisions import RowCounts
     from pipelines.record.record import RecordReport
 
-__all__ = ["record_lines"]
-
 
 def record_lines(report: "RecordReport", verbose: bool) -> list[str]:
     """Describe the outcome of each file; with `verbose`, of each of its arrays of tables."""

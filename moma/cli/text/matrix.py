@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pipelines.draw.stratigraphy.matrix import Matrix
 
-__all__ = ["matrix_lines"]
-
 SHOWN = 40
 """Units that are listed; with `verbose` all."""
 

@@ -8,8 +8,6 @@ from moma.cli.text.formats import shorten
 if TYPE_CHECKING:
     from pipelines.reports.photographs.orient import OrientReport
 
-__all__ = ["orient_lines"]
-
 
 def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:
     """Describe cameras, photographs, control points and suspected marks."""

@@ -14,8 +14,6 @@ from moma.cli.text.formats import USUAL_COLUMNS, as_csv, as_geojson, as_json, as
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
 
-__all__ = ["Question", "answer", "listed"]
-
 
 @dataclass(frozen=True)
 class Question:

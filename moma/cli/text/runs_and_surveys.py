@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from pipelines.run.run import RunReport
     from survey.records.review import Doubtful
 
-__all__ = ["ingest_lines", "profile_lines", "run_lines", "survey_report_lines"]
-
 _SHOWN = 20  # lines of a list; the report has all
 
 

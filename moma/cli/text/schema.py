@@ -4,8 +4,6 @@ import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-__all__ = ["print_schema", "schema_lines"]
-
 Branch = Mapping[str, Any]
 
 

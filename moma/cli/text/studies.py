@@ -4,8 +4,6 @@ from collections.abc import Iterator
 
 from pipelines.assess.study.study import Study
 
-__all__ = ["part_line", "study_lines"]
-
 _MAX_ACTIONS = 5  # actions that are told without --verbose
 
 

@@ -8,8 +8,6 @@ from moma.cli.text.formats import as_table
 if TYPE_CHECKING:
     from pipelines.tradeoff.study import TradeReport
 
-__all__ = ["trade_lines"]
-
 _COLUMNS = (
     "von_mises_p99",
     "von_mises_max",

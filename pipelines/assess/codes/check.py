@@ -12,16 +12,6 @@ from ground.errors import UsageError
 from mechanics.limit.kinematic import Kinematics
 from pipelines.scene.site import Site, damping_factor
 
-__all__ = [
-    "CODES",
-    "Check",
-    "CodeCheck",
-    "check_code",
-    "floor_acceleration",
-    "floor_displacement",
-    "floor_spectrum",
-]
-
 _FOLDER = Path(__file__).parent
 
 CODES = tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))

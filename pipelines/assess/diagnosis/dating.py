@@ -17,8 +17,6 @@ from pipelines.assess.motions import Motions
 from survey.quality.departures.beds import measure_beds
 from survey.quality.movement import CourseMovement, compare_courses
 
-__all__ = ["Dating", "Share", "date_movement"]
-
 _MAX_NAMED = 3  # courses of a phase that are told, nearest to the break
 _FELT = 2.0  # standard deviations of a movement below which a phase says nothing
 

@@ -27,8 +27,6 @@ from pipelines.assess.motions import Motions
 from pipelines.draw.elevations.sheet import require_figures
 from pipelines.results.folder import UNFINISHED_DIAGNOSIS, check_replaceable, replacing
 
-__all__ = ["Diagnosis", "diagnose"]
-
 
 @dataclass(frozen=True)
 class Diagnosis:

@@ -10,20 +10,12 @@ from typing import Annotated, Any
 
 from archmodel.store.lookalikes import explained, plain_form
 from ground.errors import SceneError
+from ground.settings import Setting
 from pipelines.scene.file import BESIDE
-from pipelines.toml.keys import Setting, Table, Texts, read_table
+from pipelines.toml.keys import Table, Texts, read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import TomlDocument, nearest, tables_of
 from pipelines.toml.writer import is_table_array
-
-__all__ = [
-    "DiagnosisFile",
-    "DiagnosisTable",
-    "Hypothesis",
-    "HypothesisTable",
-    "Unknown",
-    "read_diagnosis",
-]
 
 _LONGEST = 500  # characters of a formula
 _SHOWN = 60  # characters of a formula in a message

@@ -18,8 +18,6 @@ from scipy.optimize import lsq_linear
 from mechanics.arrays import Array
 from pipelines.assess.diagnosis.file import Unknown
 
-__all__ = ["Ask", "Fit", "fit"]
-
 _TURNS = 12  # of the search
 _ENOUGH = 0.02  # fall of χ² that a step must promise [-]
 _HALVINGS = 4  # of a step that makes χ² grow

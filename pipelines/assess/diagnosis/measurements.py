@@ -17,8 +17,6 @@ from survey.quality.deformation import Built, Deformation, measure_deformation
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
-__all__ = ["Measurements", "measure", "measurements"]
-
 
 @dataclass(frozen=True)
 class Measurements:

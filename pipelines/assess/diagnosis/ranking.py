@@ -10,19 +10,6 @@ from scipy.special import fdtrc, stdtrit
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.fit import Fit
 
-__all__ = [
-    "APART",
-    "QUANTILE",
-    "STILL",
-    "Estimate",
-    "Ranked",
-    "Ranking",
-    "estimates",
-    "rank",
-    "verdict",
-    "with_others",
-]
-
 STILL = "nothing has moved"
 """Name of the hypothesis without a run, to which all others are compared."""
 

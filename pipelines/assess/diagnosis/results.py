@@ -24,8 +24,6 @@ from pipelines.toml.writer import toml_text
 from survey.quality.departures.beds import measure_beds
 from survey.quality.movement import CourseMovement, compare_courses
 
-__all__ = ["INDEX", "write_best", "write_diagnosis"]
-
 _BEST = "best.toml"  # name of the scene
 
 _HYPOTHESIS = "rank hypothesis stood chi2 dof probability aicc amplitude unit value low high"  # columns

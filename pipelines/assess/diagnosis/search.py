@@ -29,20 +29,6 @@ from pipelines.scene.fingerprint import digest
 from pipelines.toml.writer import toml_text
 from survey.quality.deformation import Deformation
 
-__all__ = [
-    "RECORDS",
-    "Case",
-    "Fitted",
-    "Place",
-    "Runs",
-    "cases_of",
-    "check_case",
-    "fit_cases",
-    "kept_runner",
-    "named_files",
-    "runs_of",
-]
-
 RECORDS = ("x", "y", "z")
 """Keys of a ground motion that name files."""
 

@@ -16,8 +16,6 @@ from mechanics.arrays import Array
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.ranking import QUANTILE, Ranked
 
-__all__ = ["probes", "with_unevenness"]
-
 _OFFSETS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # of the runs, in steps of the unknown
 _UNEVEN = 0.5  # standard deviation from the runs over that from the survey, beyond which it is told in the first line
 

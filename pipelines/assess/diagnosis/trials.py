@@ -10,14 +10,12 @@ from dataclasses import dataclass
 
 from archmodel.database.session import open_database
 from ground.errors import MomaError
-from mechanics.results.result import Outcome
+from mechanics.dynamics.outcome import Outcome
 from mechanics.simulate import simulate, simulate_stages
 from pipelines.assess.motions import Motions, stone_motions
 from pipelines.assess.workers.pool import Lost, workers
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
-
-__all__ = ["Runner", "Trial", "Tried", "run_trial", "runner", "since_rest"]
 
 
 @dataclass(frozen=True)

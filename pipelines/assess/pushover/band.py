@@ -18,8 +18,6 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.rig import Rig
 from mechanics.scene.scene import Scene
 
-__all__ = ["Band", "banded", "varied"]
-
 _POINTS = 100  # of the band
 _LAWS: Mapping[str, tuple[str, ...]] = {
     "friction": ("friction", "dynamic_friction"),

@@ -5,8 +5,6 @@ import numpy as np
 from mechanics.limit.loading_test import LoadingTest
 from pipelines.assess.pushover.band import Band
 
-__all__ = ["doubts_of", "headline_of", "mechanism_of"]
-
 # share of turning, or of sliding, from which it is the whole mechanism [-]
 _MOSTLY = 0.85
 # share of steps that may be left unsolved, or that inertia may disturb, without a caution [-]

@@ -7,8 +7,6 @@ import numpy as np
 from ground.errors import UsageError
 from mechanics.arrays import Array
 
-__all__ = ["read_curve"]
-
 _MISSING = ("", "nan", "na")
 _FORM = "give lines with a displacement in mm and a force in kN, separated by a comma"
 

@@ -37,8 +37,6 @@ from pipelines.scene.rig_cautions import rig_cautions
 from pipelines.scene.selection import Groups, select_groups, select_stones
 from pipelines.scene.stages import refuse_stages
 
-__all__ = ["COLUMNS", "INDEX", "REPORT", "Pushed", "push"]
-
 INDEX = "pushover.json"
 """Index of the results of a loading test."""
 

@@ -14,8 +14,6 @@ from mechanics.arrays import Array
 from pipelines.assess.study.problem import Problem
 from pipelines.assess.study.settings import InputType
 
-__all__ = ["SLIGHT", "Action", "actions", "shares_by_group", "shares_by_input", "shares_by_stone"]
-
 _JOINTS = {
     InputType.FRICTION: "sliding tests of friction",
     InputType.COHESION: "shear tests of joints",

@@ -28,8 +28,6 @@ from pipelines.assess.study.sampling import IncompleteError, Sampler
 from pipelines.assess.study.settings import Method, StudyTable
 from pipelines.assess.workers.store import Sample
 
-__all__ = ["Estimates", "estimated", "failure_of"]
-
 _CURVE = 21  # levels of a fragility curve that are not given
 
 

@@ -29,8 +29,6 @@ from pipelines.toml.keys import read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import TomlDocument, nearest, tables_of
 
-__all__ = ["Correlation", "StudyFile", "read_study"]
-
 _LIMITS = (QuantityType.BOUND, QuantityType.CANDIDATE, QuantityType.HELD)
 _TABLES = ("study", "inputs", "correlations", "quantities")
 _SURVEYED = (InputType.DEPTH, InputType.PLANE, InputType.POINT)

@@ -25,8 +25,6 @@ from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
 from pipelines.assess.study.quantities import Limited
 
-__all__ = ["Changed", "Dual", "by_density", "by_strength", "difference", "dual", "together"]
-
 _KINK = 1e-2
 """Difference of the changes in the two senses over the change, from which both are needed: curvature makes 1e-4 [-]."""
 _SLIGHT = 1e-6

@@ -28,8 +28,6 @@ from pipelines.scene.selection import Groups, StoneModel, select_groups, select_
 from pipelines.toml.keys import build
 from pipelines.toml.writer import toml_text
 
-__all__ = ["problem_of", "snapshot_content"]
-
 _RECORDS = (StoneModel, StoneRecord, Material, Orthotropy)
 _MATERIAL: Mapping[InputType, str] = {
     InputType.DENSITY: "density",

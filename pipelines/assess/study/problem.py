@@ -32,8 +32,6 @@ from pipelines.run.assemble import Assembly, assemble_stones, closed_stones
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups, StoneModel
 
-__all__ = ["Problem"]
-
 _STEP = 1e-4
 """Step of a difference over the standard deviation [-].
 

@@ -25,8 +25,6 @@ from pipelines.results.summary import summarise
 from pipelines.run.assemble import Assembly
 from pipelines.scene.selection import StoneModel
 
-__all__ = ["Limited", "UndecidedError", "bound", "evaluate", "live_load", "quantity_name"]
-
 _EXACT = 1e-12
 """Tolerance of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-]."""
 

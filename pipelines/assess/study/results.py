@@ -22,8 +22,6 @@ from pipelines.results.checkpoints import write_whole
 from pipelines.results.summary import as_json
 from pipelines.results.table_csv import inert
 
-__all__ = ["write_results"]
-
 
 def write_results(folder: Path, summary: dict[str, Any], problem: Problem, found: Estimates) -> None:
     """Write tables, pictures and the page of a study, each file whole."""

@@ -14,8 +14,6 @@ from pipelines.assess.study.prepare import problem_of
 from pipelines.assess.workers.pool import Lost
 from pipelines.assess.workers.store import Sample, SampleStore, Snapshot
 
-__all__ = ["ATTEMPTS", "IncompleteError", "Part", "Sampler", "Task", "take"]
-
 _NUMBER = re.compile(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?")
 
 _CONTROLS = "controls"

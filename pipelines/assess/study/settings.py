@@ -6,19 +6,6 @@ from typing import Annotated
 
 from ground.settings import Setting
 
-__all__ = [
-    "Acts",
-    "CorrelationTable",
-    "InputTable",
-    "InputType",
-    "Method",
-    "QuantityTable",
-    "QuantityType",
-    "Shape",
-    "StudyTable",
-    "Texts",
-]
-
 Texts = tuple[str, ...]
 
 

@@ -32,8 +32,6 @@ from pipelines.draw.elevations.sheet import require_figures
 from pipelines.results.folder import locked
 from pipelines.run.record import store_record, versions
 
-__all__ = ["Study", "run_study"]
-
 _SNAPSHOTS = "snapshot-*.json"
 _WHOLE: Mapping[Method, str] = {
     Method.SUBSET: "each level begins from all samples of the one before",

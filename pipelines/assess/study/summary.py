@@ -24,8 +24,6 @@ from pipelines.assess.study.settings import InputType
 from pipelines.assess.workers.store import Snapshot
 from pipelines.run.record import versions
 
-__all__ = ["INDEX", "certain", "summary_of"]
-
 INDEX = "study.json"
 """Index of the results of a study."""
 

@@ -10,8 +10,6 @@ from typing import Any
 from ground.errors import UsageError
 from pipelines.assess.workers.pool import Lost, Work
 
-__all__ = ["cluster"]
-
 _PATIENCE = 30.0
 """Time in which a scheduler must answer, and have a worker: those of a queue are started before the study [s]."""
 

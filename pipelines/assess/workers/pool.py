@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-__all__ = ["Lost", "Work", "Worker", "workers"]
-
 Work = Callable[[Any], Any]
 """Function of one task, in a module."""
 

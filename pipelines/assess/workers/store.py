@@ -18,8 +18,6 @@ from ground.errors import UsageError, storing
 from mechanics.arrays import Array
 from pipelines.results.checkpoints import write_shared
 
-__all__ = ["SAMPLES", "Sample", "SampleStore", "Snapshot"]
-
 _SNAPSHOT = "snapshot-{}.json"
 SAMPLES = "samples"
 """Folder of the records."""

@@ -15,9 +15,6 @@ from survey.quality.departures.beds import BedMovement, WallBeds
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_courses"]
-
-
 _LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
 _FINER = 10.0  # largest exaggeration of a course over the smallest [-]
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["VisibleFace", "back_to_front", "draw_moved", "guess_key", "hatch", "name_stones", "visible_faces"]
-
 VisibleFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"

@@ -11,17 +11,6 @@ from survey.geometry.solids import Solid, area_vector
 from survey.joints.grown_leaf import Opening
 from survey.joints.report import ClosingReport, StoneJoint
 
-__all__ = [
-    "ClosingShapes",
-    "DrawnJoint",
-    "DrawnStone",
-    "Place",
-    "Stages",
-    "closing_shapes",
-    "joint_polygon",
-    "places",
-]
-
 _FACING = np.cos(np.radians(45.0))  # faces turned farther from the joint are not sides of it
 _NOTHING = 1e-10  # smaller areas are rounding [m²]
 _IN_PLANE = 1e-6  # metres: distance from the plane of a joint within which a corner lies in it

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_joints"]
-
-
 _STONE, _OUTLINE, _OVERLAP, _NEGATIVE = "#efede9", "#d8d4cc", "#000000", "#cc79a7"
 _EDGE_ON = np.sin(np.radians(50.0))  # joints turned farther to the viewer lie behind the faces
 _FINEST = 0.1  # shortest colour scale [mm]

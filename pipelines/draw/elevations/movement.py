@@ -21,8 +21,6 @@ from pipelines.draw.elevations.sheet import (
 from survey.quality.facades import Facade
 from survey.quality.movement import CourseMovement
 
-__all__ = ["draw_bed_movement", "draw_misfit"]
-
 _LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
 _FINER = 10.0  # largest exaggeration of a course over the smallest [-]
 _DIVERGING = "RdBu_r"  # low is blue, high is red: the same for colour-blind readers

@@ -16,8 +16,6 @@ from survey.quality.facades import WIDEST, Facade
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Orthophoto", "read_orthophoto"]
-
 _MAX_PIXELS = 3000  # pixels of the longer side that are drawn: more than a sheet shows
 
 

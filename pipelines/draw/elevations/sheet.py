@@ -13,23 +13,6 @@ from ground.errors import MissingLibraryError, missing_library
 from mechanics.arrays import Array
 from survey.quality.facades import Facade
 
-__all__ = [
-    "CODES",
-    "FLAG",
-    "INK",
-    "PALE",
-    "PLAIN",
-    "extent",
-    "frame_elevation",
-    "new_sheet",
-    "palette",
-    "project",
-    "require_figures",
-    "save_sheet",
-    "sheet_size",
-    "write_codes",
-]
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap

@@ -31,9 +31,6 @@ from survey.quality.precision import Histogram, StoneQuality
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_departure", "draw_elevation", "draw_residuals"]
-
-
 _UNKNOWN = "#dcd9d4"
 _DIVERGING = "RdBu_r"  # blue behind, red in front: safe for colour-blind readers
 _MIN_SCALE = 1.0  # shortest scale of departures [mm]

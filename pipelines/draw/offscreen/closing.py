@@ -22,9 +22,6 @@ from pipelines.draw.offscreen.parts import (
     save_picture,
 )
 
-__all__ = ["ClosingSurface", "draw"]
-
-
 _GAP = "#d55e00"
 _OVERLAP = "#000000"
 _BALL = 26.0  # diameter of a sign [px]

@@ -16,8 +16,6 @@ import numpy as np
 
 from pipelines.draw.offscreen.parts import new_plotter
 
-__all__ = ["load_surface", "run_job", "save_job", "save_surface"]
-
 Surface = TypeVar("Surface")
 
 

@@ -23,8 +23,6 @@ from pipelines.draw.offscreen.parts import (
     save_picture,
 )
 
-__all__ = ["MechanismSurface", "draw"]
-
 _PALETTE = ("YlOrRd", 0.85)  # colour map, and the part of it that is used
 _NOTE = "As the stones begin to move, exaggerated; glass: where they stand"
 

@@ -11,27 +11,6 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = [
-    "INK",
-    "LIGHT",
-    "OBLIQUELY",
-    "PLAIN",
-    "Colouring",
-    "DrawnResultants",
-    "add_coloured",
-    "add_edges",
-    "add_glass",
-    "add_resultants",
-    "fan_polygons",
-    "mesh_of",
-    "new_plotter",
-    "nice_ceiling",
-    "place_camera",
-    "robust_ceiling",
-    "save_picture",
-]
-
-
 _INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern
 _LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
 _SIZE = (1600, 1300)

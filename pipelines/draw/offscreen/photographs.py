@@ -14,8 +14,6 @@ from pipelines.draw.offscreen.jobs import run_job
 from survey.orientation.network import Camera
 from survey.orientation.projection import corrected
 
-__all__ = ["PhotographedScene", "draw"]
-
 _SAMPLES = 8  # of each pixel, against jagged edges
 _NEAR_FAR = (0.2, 60.0)  # distances within which things are seen [m]
 _QUALITY = 88  # of JPEG

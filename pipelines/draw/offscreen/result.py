@@ -25,9 +25,6 @@ from pipelines.draw.offscreen.parts import (
 )
 from pipelines.draw.offscreen.surfaces import WallSurface
 
-__all__ = ["colouring", "draw"]
-
-
 _FIXED = "#a3a09a"
 
 

@@ -13,9 +13,6 @@ from mechanics.stones.materials import Material
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.parts import fan_polygons
 
-__all__ = ["FIELDS", "WallSurface", "stone_fields", "support_motion", "wall_surface"]
-
-
 FIELDS = tuple(name for name, picture in PICTURES.items() if picture.shows != "joints")
 """Columns of `WallSurface.fields`."""
 

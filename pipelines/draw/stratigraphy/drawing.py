@@ -8,8 +8,6 @@ from archmodel.stratigraphy.dates import Dated
 from archmodel.stratigraphy.order import Order
 from pipelines.draw.stratigraphy.layout import Key, Layout, layout_of
 
-__all__ = ["matrix_svg"]
-
 LETTER, LINE, MARGIN = 7.5, 24.0, 20.0  # px: width of a letter of 12 px, height of a box, margin
 CHANNEL, TRACKS = 36.0, 5  # px between rows; heights at which lines turn
 LONGEST = 24  # letters of a label

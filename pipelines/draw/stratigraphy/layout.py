@@ -10,8 +10,6 @@ from itertools import pairwise
 
 from archmodel.stratigraphy.order import Order
 
-__all__ = ["Layout", "layout_of"]
-
 SWEEPS = 4
 """Passes over all rows; more of them change little."""
 

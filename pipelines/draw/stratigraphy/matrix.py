@@ -17,8 +17,6 @@ from pipelines.draw.stratigraphy.drawing import matrix_svg
 from pipelines.draw.stratigraphy.layout import layout_of
 from pipelines.draw.stratigraphy.page import matrix_page
 
-__all__ = ["Matrix", "draw", "study"]
-
 
 @dataclass(frozen=True)
 class Matrix:

@@ -7,8 +7,6 @@ from archmodel.stratigraphy.dates import Bounds, Contradiction, Dated
 from archmodel.stratigraphy.order import Link, Order
 from pipelines.draw.stratigraphy.drawing import matrix_svg
 
-__all__ = ["matrix_page"]
-
 _STYLE = (
     "body{font-family:sans-serif;margin:1.5em}.matrix{overflow:auto;border:1px solid #ccc;max-height:80vh}"
     "td,th{text-align:left;vertical-align:top;padding:.2em .8em}tr:target{background:#fff3b0}"

@@ -13,8 +13,6 @@ from mechanics.scene.loads.load import Loads
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
-__all__ = ["Deposition"]
-
 
 @dataclass(frozen=True)
 class Deposition:

@@ -9,8 +9,6 @@ from mechanics.planar.scene import Wall
 from mechanics.scene.loads.load import Loads
 from pipelines.geology.observe import Fields
 
-__all__ = ["Experiment", "Observed", "Setup"]
-
 
 @dataclass(frozen=True)
 class Setup:

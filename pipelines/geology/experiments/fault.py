@@ -20,8 +20,6 @@ from mechanics.scene.loads.time_series import History
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
-__all__ = ["Fault"]
-
 _FIRST_PHASE = 0.25  # of the paper's run, 10 of 40 s [-]
 _SLIP = "slip [m]"
 _FRONT = "front ahead of the tip [m]"

@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array
 from mechanics.planar.measures.outline import sides_of
 
-__all__ = ["Membrane"]
-
 
 @dataclass(frozen=True)
 class Membrane:

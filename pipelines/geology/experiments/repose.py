@@ -19,8 +19,6 @@ from pipelines.geology.experiments.deposition import Deposition
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
-__all__ = ["Repose"]
-
 _FLANK = (0.15, 0.75)  # part of the height of the heap between which its flank is straight [-]
 _FLOOR = 20.0  # length of the floor over that of the deposit [-]
 

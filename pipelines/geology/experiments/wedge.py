@@ -19,8 +19,6 @@ from mechanics.scene.loads.time_series import History
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
 
-__all__ = ["Wedge"]
-
 _MIDDLE = (0.15, 0.85)  # part of the wedge, along its base, over which its slope is measured [-]
 _BASE, _WALL = 0, 1  # numbers of the base and of the wall that pushes, after the disks
 _LATE = 0.5  # of the run, whose means are those of the forces on wall and base [-]

@@ -29,8 +29,6 @@ from survey.clouds.pictures.proposal import Proposal, propose_outlines
 from survey.clouds.pictures.statistics import bond_statistics
 from survey.clouds.settings import OutlineSettings
 
-__all__ = ["INDEX", "PAGE", "DrawnOutlines", "OutlineRequest", "draw_outlines"]
-
 INDEX = "outlines.json"
 """Name of the file that lists all files of the folder."""
 

@@ -24,8 +24,6 @@ from survey.clouds.outlines.reading import read_outlines
 from survey.clouds.settings import CloudOptions
 from survey.formats.options import ReadingOptions
 
-__all__ = ["SAVED", "IngestChoice", "OutlineEditor"]
-
 SAVED = "corrected.geojson"
 """Name of the file of the corrected outlines."""
 

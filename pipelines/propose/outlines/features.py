@@ -15,8 +15,6 @@ from survey.clouds.pictures.proposal import Proposal
 from survey.clouds.world import PixelPlace
 from survey.geometry.polygons import ring_area
 
-__all__ = ["CORRECTED", "Feature", "corrected_features", "proposed_features", "reviewed_features"]
-
 CORRECTED = "corrected by hand"
 """Evidence of an outline that a person drew or changed."""
 

@@ -11,8 +11,6 @@ from survey.quality.facades import Facade, WallPlane
 from survey.quality.masonry.index import PARAMETERS, Direction, Grade, Parameter
 from survey.quality.masonry.walls import WallStone, judge_masonry
 
-__all__ = ["quality_facts"]
-
 _PLANE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # along, up, outwards
 _WORDS = {
     Direction.VERTICAL: "vertical",

@@ -11,8 +11,6 @@ from ground.tables.geopackage import Layer, write_geopackage
 from pipelines.propose.outlines.features import Feature
 from survey.clouds.extras import optional
 
-__all__ = ["NAMES", "geojson_text", "write_outlines"]
-
 NAMES = ("outlines.geojson", "outlines.gpkg", "outlines.dxf")
 """Files of outlines."""
 

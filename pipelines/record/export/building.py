@@ -25,8 +25,6 @@ from pipelines.reports.page.known import column_of
 from pipelines.reports.page.model import Column, Stones
 from pipelines.reports.page.surfaces import stones_of
 
-__all__ = ["Building", "Group", "Value", "plain_values", "read_building", "stable_uuid"]
-
 _NAMESPACE = uuid.UUID("6a3c2f0e-6c1b-5e0b-9d52-2f6b7a4c9e11")
 """Of all identifiers that are derived from codes; it never changes."""
 

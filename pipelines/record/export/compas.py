@@ -21,8 +21,6 @@ from pipelines.record.export.compas_contacts import (
     results_document,
 )
 
-__all__ = ["model_content", "results_content"]
-
 _MESH_DEFAULTS = {"x": 0.0, "y": 0.0, "z": 0.0}
 
 

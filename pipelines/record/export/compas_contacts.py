@@ -10,15 +10,6 @@ from mechanics.arrays import Array
 from pipelines.record.export.building import stable_uuid
 from survey.geometry.solids import plane_frame
 
-__all__ = [
-    "MEGAPASCAL",
-    "POISSON",
-    "PairContact",
-    "contact_document",
-    "results_document",
-    "transformation_document",
-]
-
 MEGAPASCAL = 1e6
 """Unit of strengths and moduli in COMPAS [Pa]."""
 

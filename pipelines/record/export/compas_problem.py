@@ -32,8 +32,6 @@ from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts
 from survey.joints.snapping.snapping import snap
 
-__all__ = ["CompasProblem", "read_problem"]
-
 _GRAVITY = -Scene.gravity[-1]  # where no group of boundary conditions states it [m/s²]
 # of a relaxation, and of moving supports: in it a block falls by a quarter of a millimetre, less than a survey sees [s]
 _STEP = 5e-3

@@ -14,8 +14,6 @@ from pipelines.record.export.building import stable_uuid
 from pipelines.record.export.compas_contacts import PairContact, results_document, transformation_document
 from pipelines.record.export.compas_problem import CompasProblem, read_problem
 
-__all__ = ["moma_solve"]
-
 
 def moma_solve(problem: Any, model: Any, moving: float = 1.0, tolerance: float = 0.0) -> Any:
     """Solve a problem of compas_dem 0.6 over its block model.

@@ -10,8 +10,6 @@ from mechanics.arrays import Array
 from pipelines.record.export.building import Building
 from survey.clouds.extras import optional
 
-__all__ = ["APPLICATION", "dxf_content"]
-
 APPLICATION = "MOMA"
 """Name under which entities carry the code of their stone."""
 

@@ -19,8 +19,6 @@ from pipelines.record.export.glb import glb_content
 from pipelines.record.export.gpkg import write_gpkg
 from pipelines.record.export.ifc import ifc_content
 
-__all__ = ["ENDINGS", "Exported", "export_file"]
-
 
 @dataclass(frozen=True)
 class Exported:

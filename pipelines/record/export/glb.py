@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from pipelines.record.export.building import Building, Value, plain_values
 
-__all__ = ["glb_content"]
-
 _FLOAT, _UNSIGNED = 5126, 5125  # component types
 _VERTICES, _INDICES = 34962, 34963  # targets of views
 _ABSENT = -float(np.finfo(np.float64).max)

@@ -9,8 +9,6 @@ from ground.tables.geopackage import Layer, write_geopackage
 from mechanics.arrays import Array
 from pipelines.record.export.building import Building, Value, plain_values
 
-__all__ = ["write_gpkg"]
-
 
 def write_gpkg(building: Building, path: Path, crs: str | None = None) -> None:
     """Write a building with two layers: `stones` in space, and `elevation` along the wall and upwards.

@@ -10,8 +10,6 @@ import numpy as np
 from pipelines.record.export.building import Building, Value, plain_values, stable_uuid
 from pipelines.record.export.step import StepFile, enumeration, list_of, real, text, triples
 
-__all__ = ["global_id", "ifc_content"]
-
 _DIGITS = bytes.maketrans(
     b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/",
     b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$",

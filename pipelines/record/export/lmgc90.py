@@ -11,8 +11,6 @@ from mechanics.scene.laws.mortar import MortarJoint
 from pipelines.record.export.building import Building
 from pipelines.record.export.same_scene import SameScene, is_fixed, laws_by_group
 
-__all__ = ["lmgc90_content"]
-
 _HEAD = '''\
 """{title}: the scene of run {run} of MOMA {program}, for LMGC90.
 

@@ -15,8 +15,6 @@ from mechanics.scene.scene import Block, Fidelity, Scene
 from pipelines.run.assemble import assemble
 from pipelines.scene.file import parse_scene
 
-__all__ = ["LawGroups", "Part", "SameScene", "is_fixed", "law_of", "laws_by_group", "same_scene"]
-
 
 @dataclass(frozen=True)
 class Part:

@@ -4,8 +4,6 @@ import io
 from collections.abc import Iterable
 from datetime import datetime
 
-__all__ = ["StepFile", "enumeration", "list_of", "real", "text", "triples"]
-
 
 def text(value: str | None) -> str:
     """Return a text as STEP writes it: ASCII, all other characters as code points.

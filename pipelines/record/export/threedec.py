@@ -13,8 +13,6 @@ from mechanics.stones.polyhedra import mass_properties
 from pipelines.record.export.building import Building
 from pipelines.record.export.same_scene import SameScene, is_fixed, laws_by_group
 
-__all__ = ["threedec_content"]
-
 
 def threedec_content(building: Building, same: SameScene) -> bytes:
     """Return the data file.

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["PageDoubt", "editor_html"]
-
 _LARGEST = 4096  # side of the picture in the page [px]: what every browser draws
 _QUALITY = 85  # of its JPEG
 

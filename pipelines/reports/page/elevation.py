@@ -10,8 +10,6 @@ from markupsafe import Markup, escape
 from mechanics.arrays import Array, Ints
 from pipelines.reports.page.model import Model
 
-__all__ = ["Elevation", "elevation"]
-
 _WIDE, _HIGH = 170.0, 200.0  # room on a sheet of A4, portrait [mm]
 _SCALES = (5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000)
 _FRONT = 0.25  # cosine to the observer from which a face is drawn [-]

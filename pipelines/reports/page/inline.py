@@ -17,17 +17,6 @@ from pipelines.reports.page.languages import catalogues
 from pipelines.reports.page.model import Model
 from pipelines.reports.page.packing import pack
 
-__all__ = [
-    "MODULES",
-    "again",
-    "languages_packed",
-    "module_text",
-    "packed_models",
-    "script",
-    "style",
-    "viewer_html",
-]
-
 MODULES = ("data", "vectors", "colours", "words", "camera", "renderer", "stage", "panel", "viewer", "main")
 """Modules, each after those that it imports."""
 

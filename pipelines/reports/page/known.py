@@ -20,8 +20,6 @@ from archmodel.tables.surveys import Measurement
 from mechanics.arrays import Array
 from pipelines.reports.page.model import Column, Event, Points, Relations
 
-__all__ = ["Known", "column_of", "known_stones"]
-
 _GROUPS = {
     "Stone": "code kind course zone hypothesis length height area volume",
     "Depth": "depth depth_sigma depth_origin depth_source",

@@ -9,8 +9,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["catalogues"]
-
 
 @cache
 def catalogues() -> dict[str, dict[str, Any]]:

@@ -8,20 +8,6 @@ from numpy.typing import NDArray
 
 from mechanics.arrays import Array, Bools, Ints
 
-__all__ = [
-    "Column",
-    "Event",
-    "Joints",
-    "Lines",
-    "Mechanism",
-    "Model",
-    "Motion",
-    "Points",
-    "Relations",
-    "Stones",
-    "VertexField",
-]
-
 
 @dataclass(frozen=True)
 class Stones:

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 from mechanics.arrays import Array
 from pipelines.reports.page.model import Column, Joints, Mechanism, Model, Motion
 
-__all__ = ["pack", "unpack"]
-
 _LEVEL = 6  # of gzip
 _FINE, _COARSE = 1e-5, 1e-4  # steps of corners, and of measured points and corners of joints [m]
 _STEPS = 32767  # of an int16

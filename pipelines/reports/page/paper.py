@@ -14,8 +14,6 @@ from markupsafe import Markup, escape
 
 from ground.errors import MomaError, UsageError
 
-__all__ = ["NO_SUM", "appraise_page", "check_sum", "contents", "print_pdf", "sealed", "title_block"]
-
 NO_SUM = "0" * 64
 """Stands in a page where its checksum will."""
 

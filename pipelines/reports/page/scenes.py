@@ -29,8 +29,6 @@ from pipelines.reports.page.surfaces import rigid_motion, stones_of
 from pipelines.results.stone_values import joint_values
 from pipelines.results.summary import length_tolerance
 
-__all__ = ["assessment_model", "run_model", "with_known"]
-
 _MOST = 1_200_000  # stones times instants in a page; of longer runs every second instant, or every third, …
 _INSTANTS = 400  # at most
 _OF_JOINTS = ("pressure_mean", "pressure_max", "opening", "sliding", "kern", "friction_use", "area")

@@ -9,8 +9,6 @@ from pipelines.reports.page.model import Stones
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 
-__all__ = ["rigid_motion", "stones_of"]
-
 Faces = Sequence[Sequence[int]]
 Shape = tuple[Array, Faces]
 """Points (n, 3) of one stone [m], and its faces, counter-clockwise seen from outside."""

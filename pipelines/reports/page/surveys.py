@@ -10,8 +10,6 @@ from pipelines.reports.page.surfaces import Shape, rigid_motion, stones_of
 from survey.quality.movement import CourseMovement
 from survey.quality.precision import StoneQuality
 
-__all__ = ["bed_lines", "survey_model"]
-
 Displacement = Callable[[str, Array], Array]
 """Displacement (n, 3) of points (n, 3) of the stone of a code [m]."""
 

@@ -20,8 +20,6 @@ from survey.orientation.formats.photomodeler import read_photomodeler, write_pho
 from survey.orientation.formats.result import orientation_values, write_orientation
 from survey.orientation.network import Network
 
-__all__ = ["INDEX", "OrientReport", "orient_photographs", "photomodeler_project"]
-
 INDEX = "orientation.json"
 """The file that marks a folder as one of these results."""
 

@@ -7,8 +7,6 @@ from typing import Any
 from pipelines.draw.photographs import draw_network, draw_photo_residuals
 from pipelines.reports.html import picture, write_page
 
-__all__ = ["draw_photographs", "photographs_section", "write_photographs_page"]
-
 _MAX_ROWS = 200  # rows of a table; orientation.json has them all
 
 Row = tuple[str, ...]

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ground.errors import SceneError, UsageError
-from pipelines.toml.keys import Numbers, Setting, Texts, Vector, keys_of, read_table
+from ground.settings import Setting
+from pipelines.toml.keys import Numbers, Texts, Vector, keys_of, read_table
 from pipelines.toml.lines import key_lines, parse_toml, read_text
 from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest, tables_of
 from survey.orientation.formats.colmap import read_colmap
@@ -21,19 +22,6 @@ from survey.orientation.formats.other_programs import refuse_other_programs
 from survey.orientation.formats.photomodeler import read_photomodeler
 from survey.orientation.network import INTERIOR, Camera, Network, Photo, PlumbLine, ScaleBar
 from survey.orientation.rotations import from_angles
-
-__all__ = [
-    "CAMERA_KEYS",
-    "WRITTEN",
-    "PhotoTable",
-    "PlumbLineTable",
-    "Project",
-    "ProjectTable",
-    "ScaleBarTable",
-    "calibrated",
-    "exported_control",
-    "read_project",
-]
 
 WRITTEN = ("photomodeler", "colmap", "metashape", "dbat")
 """Formats in which a result can be written."""

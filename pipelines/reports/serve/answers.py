@@ -18,8 +18,6 @@ from ground.errors import UsageError
 from pipelines.reports.view import as_known_text, database_model, view_page
 from pipelines.results.table_csv import csv_text
 
-__all__ = ["COLUMNS", "Answers"]
-
 COLUMNS = (
     "code",
     "kind",

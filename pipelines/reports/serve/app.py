@@ -33,8 +33,6 @@ from pipelines.reports.html import render
 from pipelines.reports.serve.answers import COLUMNS, Answers
 from pipelines.reports.serve.settings import Editor, ServeSettings
 
-__all__ = ["application"]
-
 _LONGEST = 2000  # characters of an expression
 _MOST = 20  # expressions
 _SCRIPTS = re.compile(r'<script(?: type="module")?>(.*?)</script>', re.DOTALL)

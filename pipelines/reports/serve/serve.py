@@ -8,8 +8,6 @@ from archmodel.database.session import open_database
 from ground.errors import MissingLibraryError, UsageError
 from pipelines.reports.serve.settings import LOCAL, Editor, ServeSettings
 
-__all__ = ["serve_database"]
-
 _FAREWELL = 5  # time for requests in progress when the server stops [s]
 
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-__all__ = ["LOCAL", "Editor", "ServeSettings"]
-
 LOCAL = ("127.0.0.1", "localhost", "::1")
 """Names of this machine for itself."""
 

@@ -10,8 +10,6 @@ from mechanics.arrays import Array
 from survey.geometry.solids import plane_frame
 from survey.quality.precision import StoneQuality
 
-__all__ = ["CampaignComparison", "MovedStone", "compare_campaigns", "comparison_lines"]
-
 
 @dataclass(frozen=True)
 class MovedStone:

@@ -17,8 +17,6 @@ from survey.quality.masonry.walls import MasonryQuality
 from survey.quality.precision import StoneQuality, SurveyQuality
 from survey.quality.remeasure import Remeasure
 
-__all__ = ["finding_of", "survey_json", "write_survey_json"]
-
 
 def survey_json(study: SurveyStudy, version: str) -> dict[str, Any]:
     """Describe the survey as a whole: metres, degrees where a name says so, null where unknown."""

@@ -21,8 +21,6 @@ from survey.quality.masonry.walls import MasonryQuality
 from survey.quality.precision import StoneQuality
 from survey.quality.remeasure import Remeasure
 
-__all__ = ["write_survey_page"]
-
 _MAX_ROWS = 300  # rows of a table; survey.json has them all
 
 T = TypeVar("T")

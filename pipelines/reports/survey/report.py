@@ -26,8 +26,6 @@ from survey.orientation.formats.result import read_orientation
 from survey.orientation.network import listed
 from survey.quality.masonry.index import Grade
 
-__all__ = ["INDEX", "SurveyReport", "report_surveys", "write_survey_report"]
-
 INDEX = "survey.json"
 """Name of the file that lists all files of a report."""
 

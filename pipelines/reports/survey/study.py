@@ -34,8 +34,6 @@ from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
 from survey.registration.site_frame import SiteTransform
 from survey.registration.stones import survey_stones
 
-__all__ = ["CHANCES", "SurveyFile", "SurveyStudy", "study_surveys"]
-
 CHANCES = {"beds": BED_CHANCE, "faces": 0.003, "depths": 0.001}
 """Probability that a survey without fault or movement is given a finding of each sort."""
 

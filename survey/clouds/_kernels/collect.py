@@ -6,8 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["Frames", "Grid", "Patches", "Rings", "Samples", "collect"]
-
 
 class Frames(NamedTuple):
     """Planes of outlines.

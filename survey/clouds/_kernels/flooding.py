@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["flood"]
-
 
 @njit(cache=True, nogil=True)
 def flood(levels, highest, regions):

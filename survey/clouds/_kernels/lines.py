@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["contrasts", "keep_strongest", "line_means", "side_steps"]
-
 
 @njit(cache=True, nogil=True)
 def line_means(image, down, right, out):

@@ -6,8 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["Canvas", "paint"]
-
 
 class Canvas(NamedTuple):
     """A picture in the plane of a wall, of which each pixel holds sums over its points.

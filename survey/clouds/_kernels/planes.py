@@ -6,8 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-__all__ = ["COVERED", "FEW", "FINE", "STEEP", "Rules", "fit_patches", "patch_sigmas"]
-
 FINE, FEW, COVERED, STEEP = 0, 1, 2, 3  # status of `fit_patches`
 
 _TRIPLES = 300  # planes that are tried: three patches of a face half covered are clear in one of eight

@@ -20,8 +20,6 @@ from survey.clouds.outlines.tracing import few_corners
 from survey.clouds.world import PixelPlace, world_of
 from survey.formats.tables.kinds import KINDS, kind_of
 
-__all__ = ["is_annotated", "read_annotations"]
-
 _ARC = 32  # corners of a circle or an ellipse, which are then described by fewer
 _DENSE = 12  # corners beyond which an outline was drawn as a curve
 _REMEDY = "draw each stone as a polygon, or export COCO"

@@ -11,8 +11,6 @@ from ground.errors import SurveyError, UsageError
 from survey.arrays import Array, Bools, Ints
 from survey.formats.tables.kinds import KINDS, kind_of
 
-__all__ = ["check_stones", "class_of_stones", "neck", "of_class", "refuse_mortar"]
-
 _PIECES = 4  # pieces of one number, of which none has half of its area, that make it a class
 _HALF = 0.5  # share of an area that is most of it [-]
 _MIN_PIECES = 3  # pieces of black that stones in black have at least

@@ -19,8 +19,6 @@ from survey.clouds.world import PixelPlace, world_of
 from survey.formats.tables.kinds import KINDS, kind_of
 from survey.geometry.polygons import ring_area
 
-__all__ = ["is_coco", "load_json", "read_coco", "run_lengths"]
-
 _REMEDY = "give annotations with a segmentation, as COCO describes them"
 
 

@@ -19,8 +19,6 @@ from survey.formats.tables.kinds import KINDS, kind_of
 from survey.geometry.polygons import inside
 from survey.geometry.solids import area_vector
 
-__all__ = ["read_dxf"]
-
 _UNITS = {
     "Millimeters": "mm",
     "Centimeters": "cm",

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["Curve", "DrawnText", "Entities", "entities_of"]
-
 _CLOSE = 0.002  # distance of the ends of a curve that counts as closed, of its longest side
 _SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
 _DEEPEST = 16  # blocks within blocks

@@ -16,8 +16,6 @@ from survey.clouds.outlines.tracing import few_corners, trace
 from survey.clouds.world import PixelPlace, world_of
 from survey.geometry.polygons import ring_area
 
-__all__ = ["Labels", "outline_of_mask", "outlines_of", "read_labels"]
-
 _LARGEST = 2**24  # number of a stone: as many as there are colours
 _GREY = 0.02  # share of pixels that are neither black nor white, and not between both, in a picture of two colours
 _RIM = 5  # pixels of the square in which the smoothed edge between black and white has both

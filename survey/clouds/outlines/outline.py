@@ -15,21 +15,6 @@ from survey.formats.fields import NO_COURSE
 from survey.formats.tables.columns import ALIASES
 from survey.records.survey import DEPTH_ORIGINS
 
-__all__ = [
-    "FIELDS",
-    "PROPOSED",
-    "Attributes",
-    "Outline",
-    "WrongOutline",
-    "attributes_of",
-    "columns_of",
-    "distinct",
-    "field_map",
-    "joined_code",
-    "joined_names",
-    "made_code",
-]
-
 FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "code": (

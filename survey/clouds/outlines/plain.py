@@ -13,8 +13,6 @@ from ground.tables.numbers import is_number
 from survey.arrays import Array
 from survey.clouds.outlines.outline import Outline, attributes_of, columns_of, joined_code, made_code
 
-__all__ = ["is_plain", "read_plain_json", "read_table"]
-
 _JSON = 'give a list of objects such as {"code": "S1", "outline": [[0.1, 0.2], …]}'
 _CSV = "give a header with code, x and y, and a row for each corner, in order around its stone"
 _CORNERS = {**COORDINATES, "x": (*COORDINATES["x"], "s", "u"), "y": (*COORDINATES["y"], "t", "v")}

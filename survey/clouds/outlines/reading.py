@@ -20,8 +20,6 @@ from survey.clouds.world import PixelPlace
 from survey.formats.fields import KIND, NUMBERED_ANEW
 from survey.formats.tables.kinds import kind_of
 
-__all__ = ["PICTURES", "Drawing", "read_outlines"]
-
 PICTURES = (".png", ".tif", ".tiff", ".bmp")
 """Endings of label pictures."""
 

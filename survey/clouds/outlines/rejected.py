@@ -8,8 +8,6 @@ from survey.clouds.outlines.outline import Outline, WrongOutline
 from survey.clouds.outlines.reading import read_outlines
 from survey.records.survey import Reject
 
-__all__ = ["MARK", "rejected_outlines"]
-
 MARK = "outlines rejected by moma"
 """Text in the first line of the files, by which they are recognised."""
 

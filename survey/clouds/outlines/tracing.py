@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from survey.arrays import Array, Bools
 from survey.geometry.polygons import ring_area
 
-__all__ = ["few_corners", "trace"]
-
 _SHARP = math.sin(
     math.radians(12.0)
 )  # sine of the angle between sides below which they do not meet in a corner

@@ -14,8 +14,6 @@ from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Attributes, Outline, WrongOutline, attributes_of, made_code
 from survey.formats.tables.wkt import is_wkt
 
-__all__ = ["read_vector", "read_wkt_table", "wkt_table"]
-
 _DEGREES = 1e-3  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
 _PIXELS = 30.0  # width of the usual outline from which it is of pixels: no stone is 30 m wide
 _SMALL = 0.02  # share of the area of the largest part up to which other parts are specks [-]

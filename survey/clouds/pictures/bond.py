@@ -22,8 +22,6 @@ from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.joints import STRONGEST, WIDTH, Strength
 from survey.clouds.pictures.regions import borders_of
 
-__all__ = ["FEATURES", "GAP", "LIKELY", "WEIGHTS", "Bond", "Border", "bond_of", "join_weak", "renumbered"]
-
 FEATURES = ("constant", "strength", "gaps", "fuller", "askew", "size", "step")
 """Names of what the probability depends on."""
 

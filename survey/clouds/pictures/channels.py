@@ -7,8 +7,6 @@ from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import ROUNDED, WIDTH, Field
 
-__all__ = ["channels_of", "covered", "grains", "lightness", "openings", "without_shade"]
-
 _DARK = 0.40  # lightness over that of the wall below which it is an opening: the darkest shade leaves more than half
 _BLACK = 16.0  # L* + 16 is in proportion to the cube root of the luminance (CIE 1976)
 _BEHIND = 0.12  # distance of an opening behind the faces [m], more than joints are deep

@@ -21,20 +21,6 @@ from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools, Ints
 from survey.clouds._kernels.lines import contrasts, keep_strongest, line_means, side_steps
 
-__all__ = [
-    "DIRECTION",
-    "ROUNDED",
-    "STEP_REACH",
-    "STRONGEST",
-    "WIDTH",
-    "Field",
-    "Strength",
-    "combined",
-    "grain_and_contrast",
-    "line_strength",
-    "step_evidence",
-]
-
 WIDTH = 3.0
 """Width of a joint at the resolution of the work [px]."""
 

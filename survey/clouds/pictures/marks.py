@@ -10,8 +10,6 @@ from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.pictures.proposal import Proposal
 
-__all__ = ["Mark", "mark_outlines"]
-
 _STONE_SHARE = 0.25  # part of a proposed stone within an outline from which the outline holds it
 _SHARE_WITHIN_STONE = 0.6  # part of an outline within a proposed stone from which it lies in it
 _OVERLAP = 0.05  # shared part of the smaller of two outlines from which they overlap

@@ -8,8 +8,6 @@ import numpy as np
 
 from survey.arrays import Array
 
-__all__ = ["Named", "name_stones"]
-
 _HEADER = 1.5  # length over height below which a stone of a course shows its head
 _SHARED = 0.5  # part of the lesser height that two neighbours of one course share
 _NEAR = 0.25  # distance between neighbours of a course, over their height

@@ -14,8 +14,6 @@ from survey.clouds.pictures.joints import Field
 from survey.clouds.views.orthophoto import STEP, filled
 from survey.clouds.world import PixelPlace, world_of
 
-__all__ = ["Photograph", "open_photograph"]
-
 _STRETCHED = 0.02  # by which the two sides of a pixel may differ [-]
 _INDEX = "cloud.json"  # of a folder that `moma cloud` writes
 

@@ -30,16 +30,6 @@ from survey.clouds.pictures.suitability import Findings, judge_picture, judge_re
 from survey.clouds.settings import OutlineSettings
 from survey.geometry.polygons import ring_area
 
-__all__ = [
-    "Fields",
-    "Proposal",
-    "ProposedBorder",
-    "ProposedStone",
-    "joined_regions",
-    "measured_fields",
-    "propose_outlines",
-]
-
 _REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
 _HIDDEN = 0.6  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone

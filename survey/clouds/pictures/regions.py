@@ -10,8 +10,6 @@ from survey.arrays import Array, Bools, Ints
 from survey.clouds._kernels.flooding import flood
 from survey.clouds.pictures.joints import STRONGEST, WIDTH, Field, Strength
 
-__all__ = ["Borders", "borders_of", "closed_regions", "over_texture"]
-
 _WEAK = 0.3  # strength over that of a joint below which there is stone
 _APART = 2.0 * WIDTH  # distance between the middles of two regions [px]
 _TOWARDS = 0.02  # by which the place farthest from all joints is lower, over the strength of a joint

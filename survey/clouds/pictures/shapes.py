@@ -11,8 +11,6 @@ from survey.clouds.outlines.tracing import few_corners, trace
 from survey.clouds.pictures.joints import WIDTH, Field
 from survey.geometry.polygons import ring_area
 
-__all__ = ["Shape", "outline_shapes", "without_mortar"]
-
 _STRAIGHT = 1.5  # distance of a traced boundary from the sides of its outline [px of the work]
 _MIN_CORNERS = 4  # corners of an outline that has none to spare
 _BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint

@@ -7,8 +7,6 @@ import numpy as np
 
 from survey.arrays import Array
 
-__all__ = ["bond_statistics"]
-
 _STAGGERED = 0.25  # distance of a head joint from those below, over the height of its course, that bonds
 
 

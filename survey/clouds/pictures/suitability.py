@@ -10,8 +10,6 @@ from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.clouds.pictures.channels import lightness
 
-__all__ = ["Findings", "judge_picture", "judge_result"]
-
 _SMALLEST = 96  # pixels of the shorter side: fewer hold no two courses whose joints are three pixels wide
 _FAINT = 0.35  # contrast of joints over grain below which none stands out
 _TILTED = 2.0  # angle of the beds from level [degrees]: a surveyed wall leans less, its beds sag less

@@ -11,8 +11,6 @@ from ground.errors import SurveyError
 from survey.arrays import Array
 from survey.records.survey import Station
 
-__all__ = ["CHUNK", "Chunk", "Chunks", "PointCloud", "lost_digits"]
-
 CHUNK = 1_000_000
 """Points of a chunk: 24 MB of coordinates, and large enough that a chunk's fixed costs do not count."""
 

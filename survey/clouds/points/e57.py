@@ -16,8 +16,6 @@ from survey.clouds.extras import optional
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
 from survey.records.survey import Station
 
-__all__ = ["open_e57"]
-
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _UNLIMITED = 1e9  # bounds of a field beyond which a program states none [m]

@@ -12,8 +12,6 @@ from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 
-__all__ = ["open_las"]
-
 _HEAD, _LEAST_HEAD = (
     255,
     227,

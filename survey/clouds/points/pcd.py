@@ -15,8 +15,6 @@ from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
 from survey.records.survey import Station
 
-__all__ = ["open_pcd"]
-
 _LONGEST_HEAD = 40  # lines
 _TYPES = {("F", 4): "f4", ("F", 8): "f8", **{(t, n): f"{t.lower()}{n}" for t in "IU" for n in (1, 2, 4, 8)}}
 

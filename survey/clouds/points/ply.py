@@ -12,8 +12,6 @@ from ground.tables.numbers import unreadable
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
 
-__all__ = ["open_ply"]
-
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",

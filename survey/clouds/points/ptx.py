@@ -22,8 +22,6 @@ from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 from survey.records.survey import Station
 
-__all__ = ["is_ptx", "open_ptx"]
-
 _WORDS = "1133334444"  # how many numbers stand on each line before the points of a scan
 _HEAD = len(_WORDS)
 _SHORTEST = 8  # bytes of a line of a point: "0 0 0 0" with its end

@@ -12,8 +12,6 @@ from survey.clouds.points.ply import open_ply
 from survey.clouds.points.ptx import is_ptx, open_ptx
 from survey.clouds.points.text import open_text
 
-__all__ = ["CLOUDS", "open_points"]
-
 CLOUDS: Mapping[str, Callable[[Path], PointCloud]] = {
     ".las": open_las,
     ".laz": open_las,

@@ -15,8 +15,6 @@ from ground.tables.number_stream import NumberStream, open_numbers
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 
-__all__ = ["open_text"]
-
 _LINES = CHUNK // 4  # lines in memory at a time: Python's strings take 70 bytes each
 _COLOURED = (6, 7)  # columns of x y z r g b, without or with an intensity before the colours
 _RGB = ("red", "green", "blue")

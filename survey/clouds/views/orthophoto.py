@@ -15,8 +15,6 @@ from survey.clouds.wall import Wall
 from survey.clouds.world import world_file
 from survey.quality.facades import upright_frame
 
-__all__ = ["STEP", "Picture", "filled", "find_wall", "paint_wall", "write_picture"]
-
 STEP = 1e-4
 """Step of the numbers of a depth map [m]."""
 

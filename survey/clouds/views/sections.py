@@ -15,8 +15,6 @@ from survey.arrays import Array, Ints
 from survey.clouds.views.orthophoto import Picture, filled
 from survey.clouds.wall import Wall
 
-__all__ = ["Section", "SectionPlane", "contour", "join", "section_plane"]
-
 _PLANE = re.compile(r"\s*([zsd])\s*=\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:m\s*)?")
 _REACH = 3.0  # cells between neighbours on a line: two may be empty, and joints are recessed
 _SHORTEST = 4  # cells of the shortest line; fewer are stray points

@@ -12,8 +12,6 @@ from numba import njit
 
 from survey.arrays import Array
 
-__all__ = ["Points", "cross", "dot", "leverages", "orient", "precision", "weighted_plane"]
-
 _COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
 _UNCHECKED = 1e-9  # share of the other points in a residual below which they do not check it
 

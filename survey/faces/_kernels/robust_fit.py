@@ -8,8 +8,6 @@ from numba import njit
 from survey.faces._kernels.planes import Points, dot, leverages, orient, precision, weighted_plane
 from survey.faces._kernels.triples import STARTS, beside_the_rest, cost, search_triples, smallest
 
-__all__ = ["COLLINEAR", "FINE", "NOT_FINITE", "SIGMA", "fit_face"]
-
 FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # status of `fit_face`
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %

@@ -9,8 +9,6 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["fit_columns", "fit_two_planes", "grow_columns", "truncated_sum"]
-
 _LIMIT = 3.29**2  # square of a standardised residual beyond which a point is an outlier: α₀ = 0.1 %
 _DIRECTIONS = 24  # directions tried for the line that divides the points
 _TILTED = 6.63  # chi-square of one parameter at 1 %

@@ -7,8 +7,6 @@ from numba import njit
 
 from survey.faces._kernels.planes import cross, dot
 
-__all__ = ["STARTS", "beside_the_rest", "cost", "search_triples", "smallest"]
-
 STARTS = 6  # planes of least truncated squares that are kept
 
 _CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %

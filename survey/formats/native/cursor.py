@@ -8,8 +8,6 @@ from ground.tables.numbers import parse_length, parse_number, shown
 from survey.formats.fields import CODE, KIND, parse_course
 from survey.formats.tables.kinds import kind_of
 
-__all__ = ["NAME_REMEDY", "Cursor"]
-
 NAME_REMEDY = "use letters, digits and . + / : - _, at most 64"
 
 _WORD = re.compile(r'\s*("[^"]*"(?=\s|$)|\S+)')

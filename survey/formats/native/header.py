@@ -21,8 +21,6 @@ from survey.records.survey import (
     SurveyHead,
 )
 
-__all__ = ["HeadReader", "missing", "read_extrusion"]
-
 _FEWEST_MARKS = 4  # a homography has eight unknowns
 
 

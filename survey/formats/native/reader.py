@@ -44,11 +44,9 @@ from ground.tables.text_lines import TextLines
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS, StoneReader
-from survey.formats.native.writer import MAGIC, write_moma
+from survey.formats.native.writer import MAGIC
 from survey.formats.options import ReadingOptions, whole
 from survey.records.survey import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
-
-__all__ = ["open_moma", "read_head", "read_moma", "with_header", "write_moma"]
 
 
 def open_moma(path: Path, options: ReadingOptions | None = None) -> SurveyStream:

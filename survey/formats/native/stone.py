@@ -11,8 +11,6 @@ from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import missing, read_extrusion
 from survey.records.survey import BlockRecord, Extrusion, PointMark, SurveyHead
 
-__all__ = ["STONE_WORDS", "StoneReader"]
-
 STONE_WORDS = (
     "vertex", "point", "photo", "pixel", "mark", "on", "station", "extrude", "sigma", "depth", "note", "end",
 )  # fmt: skip

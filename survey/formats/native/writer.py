@@ -18,8 +18,6 @@ from survey.records.survey import (
     SurveyHead,
 )
 
-__all__ = ["MAGIC", "write_head", "write_moma"]
-
 MAGIC = "moma-survey 1"
 
 

@@ -23,8 +23,6 @@ from survey.formats.tables.reader import open_table
 from survey.formats.tables.wkt import ring_of
 from survey.records.survey import Reject, SurveyStream
 
-__all__ = ["open_geojson"]
-
 _DEGREES = 1e-3  # extents below which coordinates of stones are degrees, beside heights of metres
 _LARGEST = 1 << 29  # bytes
 

@@ -18,8 +18,6 @@ from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
 from survey.records.survey import SurveyStream
 
-__all__ = ["open_gsi"]
-
 _WORD = re.compile(r"(\d{2})(....)([+-])(.+)")
 _UNITS = {"0": 1e-3, "1": 0.3048e-3, "6": 1e-4, "7": 0.3048e-4, "8": 1e-5}
 """Length of the last digit of a coordinate by the character for its unit [m]."""

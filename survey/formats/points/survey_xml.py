@@ -18,8 +18,6 @@ from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
 from survey.records.survey import SurveyStream
 
-__all__ = ["open_jobxml", "open_landxml"]
-
 _METRIC = {"meter": 1.0, "metre": 1.0, "millimeter": 1e-3, "centimeter": 1e-2, "kilometer": 1e3}
 _LINEAR = {**_METRIC, "foot": 0.3048, "ussurveyfoot": 1200.0 / 3937.0, "inch": 0.0254}
 

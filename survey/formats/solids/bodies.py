@@ -22,8 +22,6 @@ from survey.geometry.repair.repair import Repaired, holes_of, open_edges, repair
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight
 
-__all__ = ["ClosedBody", "RawBody", "check_coordinates", "closed_bodies", "compact"]
-
 Polygon = tuple[int, ...]
 
 _COARSEST = 1e-3  # a third of the precision of a measured point [m]

@@ -16,8 +16,6 @@ from ground.errors import GeometryError
 from survey.arrays import Array
 from survey.geometry.solids import area_vector
 
-__all__ = ["body_groups", "signed_volume"]
-
 Polygon = tuple[int, ...]
 Edge = tuple[int, int]
 

@@ -17,8 +17,6 @@ from ground.tables.numbers import unreadable
 from survey.arrays import Array
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
-__all__ = ["CompasBlock", "CompasModel", "compas_bodies", "read_compas"]
-
 _REMEDY = "write a BlockModel, an Assembly or meshes with compas.json_dump"
 
 

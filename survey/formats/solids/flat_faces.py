@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = ["merge_flat", "rounding"]
-
 Polygon = tuple[int, ...]
 
 _BULGE = 1e-4  # warp of a plane polygon rounded to a few digits, over its size

@@ -18,8 +18,6 @@ from ground.tables.text_lines import TextLines
 from survey.arrays import Array
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
-__all__ = ["lmgc90_bodies"]
-
 _FIELD = re.compile(r"(\w+(?:\(\d\))?)\s*=\s*([-+]?\d*\.?\d+(?:[EeDd][-+]?\d+)?)")
 _ALL = {*"123456"}  # components of the velocity of a rigid body
 _DIGITS = float(

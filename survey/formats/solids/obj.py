@@ -13,8 +13,6 @@ from ground.tables.numbers import parse_number, shown
 from ground.tables.text_lines import TextLines
 from survey.formats.solids.bodies import RawBody, compact
 
-__all__ = ["obj_bodies"]
-
 _CORNER = re.compile(r"(-?[0-9]{1,9})(?:/-?[0-9]*){0,2}").fullmatch
 _PASSED_OVER = {
     *("vt", "vn", "vp", "s", "usemtl", "mtllib", "l", "p", "mg", "bevel", "c_interp", "d_interp", "lod"),

@@ -5,8 +5,6 @@ from pathlib import Path
 
 from survey.records.survey import SolidRecord
 
-__all__ = ["write_obj"]
-
 
 def write_obj(solids: Sequence[SolidRecord], path: Path) -> None:
     """Write solids that are read back equal to the last bit; objects are named CODE:KIND.

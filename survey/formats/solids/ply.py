@@ -12,8 +12,6 @@ from ground.tables.numbers import parse_number, shown, unreadable
 from ground.tables.text_lines import TextLines
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
-__all__ = ["ply_bodies"]
-
 _TYPES = {  # by name: the code of `struct`
     **dict.fromkeys(("char", "int8"), "b"),
     **dict.fromkeys(("uchar", "uint8"), "B"),

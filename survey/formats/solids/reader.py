@@ -34,8 +34,6 @@ from survey.joints.snapping.snapping import snap
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject, SolidRecord, SurveyStream
 
-__all__ = ["open_solids"]
-
 _CODES = "{block}:{kind}"
 _MOST_CHANGE = 0.1  # largest relative change of a stone's volume by snapping
 _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {

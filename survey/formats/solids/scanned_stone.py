@@ -14,8 +14,6 @@ from survey.arrays import Array, Bools, Ints
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, volume_of
 
-__all__ = ["ScannedStone", "is_scanned", "plane_faces"]
-
 _MANY = 500  # least number of facets: nobody models a stone with as many
 _SMALL = 0.05  # largest facet over the whole surface: a modelled stone has some large plane faces
 _BENT = 0.5  # least part of the edges that are bent: flat ones only divide a modelled face

@@ -10,8 +10,6 @@ from ground.tables.numbers import parse_number, shown, unreadable
 from ground.tables.text_lines import TextLines
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
-__all__ = ["stl_bodies"]
-
 _SINGLE = 2.0**-23  # relative resolution of single precision
 _ORDER: Mapping[str, tuple[str, ...]] = {  # the line that must follow
     "solid": ("facet", "endsolid"),

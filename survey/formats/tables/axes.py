@@ -18,18 +18,6 @@ from survey.formats.tables.point_table import TableStone
 from survey.geometry.solids import area_vector
 from survey.records.survey import SurveyHead
 
-__all__ = [
-    "ORDERS",
-    "AxisEvidence",
-    "Outlines",
-    "both_orders",
-    "exchanged",
-    "exchanged_station",
-    "order_in_words",
-    "other_order",
-    "outlines_of",
-]
-
 ORDERS = {"pnezd": "northing first", "penzd": "easting first"}
 """Order of the two level coordinates by format."""
 

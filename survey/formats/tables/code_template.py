@@ -19,8 +19,6 @@ from survey.formats.fields import code_of
 from survey.formats.tables.point_table import FEWEST_CORNERS
 from survey.formats.tables.roles import CONTROL, ROLES, is_bare, role_of, roles_with
 
-__all__ = ["CodeFields", "CodeTemplate"]
-
 _CODE, _CODE_LETTERS = r"[^\W_][\w.+/:-]{0,63}", r"\w.+/:-"
 _FREE, _FREE_LETTERS = r"[^\W_][^\t%s]{0,63}", r"^\t%s"  # all but what separates fields
 _FIELDS = {  # pattern of each field, and its characters

@@ -25,15 +25,6 @@ from ground.tables.columns import (
 from ground.tables.numbers import shown
 from survey.formats.tables.point_table import FEWEST_CORNERS
 
-__all__ = [
-    "ALIASES",
-    "ColumnMap",
-    "Columns",
-    "find_columns",
-    "kind_of_column",
-    "read_map",
-]
-
 ALIASES: Mapping[str, Sequence[str]] = {
     # English; German; French; Italian; Spanish
     "block": (

@@ -15,8 +15,6 @@ from survey.formats.tables.columns import ColumnMap, Columns, kind_of_column
 from survey.formats.tables.point_table import FEWEST_CORNERS, TableStone
 from survey.formats.tables.roles import CONTROL, ROLES, STATION, role_of, roles_with
 
-__all__ = ["are_headed", "check_names", "check_stones_repeat", "note_key", "with_role", "with_units"]
-
 AnyRows = TextRows | ListRows
 
 _ROLE_WORDS = frozenset(

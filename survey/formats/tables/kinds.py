@@ -11,8 +11,6 @@ from ground.tables.numbers import shown
 from ground.tables.rows import open_rows
 from survey.formats.fields import KIND
 
-__all__ = ["KINDS", "kind_of", "meant", "read_kinds"]
-
 KINDS: Mapping[str, Sequence[str]] = {
     # German; French; Italian; Spanish
     "ashlar": ("Quader", "pierre de taille", "concio", "sillar", "sillería"),

@@ -12,8 +12,6 @@ from ground.tables.numbers import shown
 from survey.arrays import Array
 from survey.records.survey import BlockRecord, Reject, SurveyHead
 
-__all__ = ["FEWEST_CORNERS", "PointTable", "TableStone", "check_station"]
-
 FEWEST_CORNERS = 3
 """Corners of a face."""
 _HOPELESS = 1000  # wrong lines without any stone after which the file is refused

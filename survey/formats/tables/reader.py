@@ -48,19 +48,6 @@ from survey.formats.tables.roles import CONTROL, STATION, is_bare, role_of, role
 from survey.formats.tables.wkt import outline_of
 from survey.records.survey import DEPTH_ORIGINS, Station, Survey, SurveyHead, SurveyStream
 
-__all__ = [
-    "CODES",
-    "NEEDED",
-    "OPTIONAL",
-    "PointCollector",
-    "is_table",
-    "open_csv",
-    "open_penzd",
-    "open_pnezd",
-    "open_table",
-    "read_csv",
-]
-
 CODES = "{block}:{role}"
 """Template of descriptions, if none is given."""
 

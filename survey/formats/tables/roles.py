@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from ground.errors import UsageError
 from ground.tables.numbers import shown
 
-__all__ = ["CONTROL", "ROLES", "STATION", "is_bare", "read_roles", "role_of", "roles_with"]
-
 STATION = "station"
 """The role of a position of the instrument."""
 

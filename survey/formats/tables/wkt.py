@@ -8,8 +8,6 @@ from ground.errors import SurveyError
 from ground.tables.numbers import FARTHEST, shown
 from survey.arrays import Array
 
-__all__ = ["FLAT", "is_wkt", "outline_of", "ring_of"]
-
 FLAT = (
     "export outlines with z (PolygonZ, 3D); outlines in the plane of a wall are read by --outlines FILE, with --depth "
     "or with --cloud"

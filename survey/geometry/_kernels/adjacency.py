@@ -10,8 +10,6 @@ from numba import njit
 
 from survey.geometry._kernels.vectors import dot
 
-__all__ = ["GROUPS", "face_planes", "facing_faces", "thickness", "touching_faces"]
-
 GROUPS = 4
 """Directions in which one solid can touch another; further ones are merged with the nearest of these."""
 

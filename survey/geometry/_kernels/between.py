@@ -7,8 +7,6 @@ from numba import njit
 
 from survey.geometry._kernels.adjacency import thickness
 
-__all__ = ["hidden", "thinnest_of"]
-
 
 @njit(cache=True)
 def hidden(pairs, rows, near, solid, planes, thinnest, reach):

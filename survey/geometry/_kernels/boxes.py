@@ -7,8 +7,6 @@ The tree is complete and binary over boxes in Morton order: node 1 is the root, 
 import numpy as np
 from numba import njit
 
-__all__ = ["count_near", "list_near", "morton_codes"]
-
 
 @njit(cache=True)
 def morton_codes(centres, low, scale):

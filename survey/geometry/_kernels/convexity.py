@@ -7,8 +7,6 @@ from numba import njit
 
 from survey.geometry._kernels.vectors import height_over
 
-__all__ = ["deepest_overlaps", "highest_corners"]
-
 
 @njit(cache=True)
 def deepest_overlaps(pairs, vertices, vertex_starts, planes, plane_starts, least):

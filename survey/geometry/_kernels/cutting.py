@@ -8,8 +8,6 @@ from numba import njit
 from survey.arrays import Array, Ints
 from survey.geometry._kernels.vectors import height_over
 
-__all__ = ["EMPTY", "FULL", "OPEN", "CutSolid", "cut_out"]
-
 FULL, EMPTY, OPEN = 0, 1, 2
 """Outcome: a solid, nothing, or something that the planes do not close."""
 

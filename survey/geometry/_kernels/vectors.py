@@ -2,8 +2,6 @@
 
 from numba import njit
 
-__all__ = ["dot", "height_over"]
-
 
 @njit(cache=True, inline="always")
 def dot(u, v):

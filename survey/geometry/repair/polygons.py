@@ -8,8 +8,6 @@ from survey.arrays import Array
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 
-__all__ = ["Polygon", "is_flat_line", "simple_polygons", "without_repeats"]
-
 Polygon = tuple[int, ...]
 
 _NO_HEIGHT = 1e-10  # height of a face without area, over the longest side

@@ -19,8 +19,6 @@ from survey.geometry.repair.polygons import Polygon, is_flat_line, simple_polygo
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 
-__all__ = ["Hole", "Repaired", "holes_of", "open_edges", "repair"]
-
 Edge = tuple[int, int]
 
 _SMALL = 0.03  # largest hole that is covered, over the area of the surface

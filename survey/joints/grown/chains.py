@@ -8,8 +8,6 @@ import numpy as np
 from survey.arrays import Array, Bools
 from survey.geometry.polygons import ring_area
 
-__all__ = ["apart", "crosses", "is_simple"]
-
 
 def apart(places: Array, ring: Array, closed: bool = True) -> Array:
     """Return the distances (n,) of places (n, 2) from the sides of a polygon, or of an open chain [m]."""

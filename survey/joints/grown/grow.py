@@ -18,8 +18,6 @@ from survey.joints.grown_leaf import GrownLeaf, Opening
 from survey.joints.report import StoneJoint
 from survey.joints.settings import JointSettings
 
-__all__ = ["GrownStones", "grow"]
-
 _SAMPLES = 50  # along the side of a usual stone
 _CLOSE = 8  # and across the widest mortar, so that samples tell what it fills
 _SIDES = ("left", "below", "right", "above")  # of the frame

@@ -12,8 +12,6 @@ from survey.joints.settings import JointMode, JointSettings
 from survey.records.survey import FRAME_NOTE, OUTLINE_NOTE
 from survey.simplify.simplify import BlockyStone
 
-__all__ = ["Leaf", "find_leaves"]
-
 _DRAWN = 1e-5  # metres: distance within which planes that were stated, not measured, are the same
 _TURNED = 1e-3  # of a stone's size: by which it may depart from a prism
 _LEVEL = 1e-9  # of a normal's upward component: less is rounding

@@ -19,8 +19,6 @@ from survey.arrays import Array, Ints
 from survey.geometry.polygons import inside
 from survey.joints.grown.openings import open_places, usual_width
 
-__all__ = ["LEFT_BELOW_RIGHT_ABOVE", "Line", "MedialLines", "medial_lines"]
-
 LEFT_BELOW_RIGHT_ABOVE = (-1, -2, -3, -4)
 """Numbers that stand for the sides of the frame where a line runs along it instead of between two stones."""
 

@@ -15,8 +15,6 @@ from scipy.spatial import Voronoi, cKDTree
 from survey.arrays import Array, Bools, Ints
 from survey.geometry.polygons import inside
 
-__all__ = ["open_places", "usual_width"]
-
 _SAME_SAMPLE = (
     1e-3  # of the distance of a sample of an opening from its edge: samples as near to each other are one
 )

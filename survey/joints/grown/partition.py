@@ -13,8 +13,6 @@ from survey.geometry.polygons import inside
 from survey.joints.grown.chains import apart, crosses, is_simple
 from survey.joints.grown.medial_lines import Line, MedialLines
 
-__all__ = ["Edge", "Partition", "partition"]
-
 _CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
 _STRAIGHTENINGS = 10  # in each of which edges that cross others follow their lines twice as closely
 _STEPS = 3  # of Newton's rule

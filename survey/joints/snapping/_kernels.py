@@ -11,8 +11,6 @@ from numba import njit
 from survey.geometry._kernels.adjacency import _basis, _boxes_apart, _buffers, _flatten, _shared
 from survey.geometry._kernels.vectors import dot
 
-__all__ = ["matching_faces", "near_pairs"]
-
 _OPPOSITE = -0.9
 """Cosine of opposite faces: heights over the common plane decide, except for small faces."""
 

@@ -17,8 +17,6 @@ from survey.geometry.adjacency import SolidArrays
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.snapping._kernels import matching_faces, near_pairs
 
-__all__ = ["Match", "common_planes", "find_matches"]
-
 
 @dataclass(frozen=True)
 class Match:

@@ -23,8 +23,6 @@ from survey.geometry.solids import Solid
 from survey.joints.snapping.matching_faces import Match, common_planes, find_matches
 from survey.records.snapping import OpenContact, Snapping
 
-__all__ = ["snap"]
-
 Polygon = tuple[int, ...]
 
 _EXACT = 1e-12  # of the size of all: largest distance of a corner from its planes

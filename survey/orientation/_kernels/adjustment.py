@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from survey.orientation._kernels.camera import PARAMETERS, ray
 
-__all__ = ["Rays", "Unknowns", "back_substitute", "datum_sums", "point_statistics", "reduced_normals"]
-
 
 class Rays(NamedTuple):
     """Measured image points, sorted by their points.

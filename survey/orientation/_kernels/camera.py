@@ -18,8 +18,6 @@ Interior orientation is the row c, x_p, y_p, a, s, K₁, K₂, K₃, P₁, P₂.
 
 from numba import njit
 
-__all__ = ["INTERIOR", "PARAMETERS", "brown", "ray"]
-
 INTERIOR = 10
 """Number of parameters of the interior orientation."""
 

@@ -16,26 +16,6 @@ from survey.orientation._kernels.adjustment import Rays, Unknowns, back_substitu
 from survey.orientation.network import INTERIOR, Network, Photo
 from survey.orientation.rotations import angle_slopes, turned
 
-__all__ = [
-    "EXTERIOR",
-    "MAX_ITERATIONS",
-    "SIMILARITY",
-    "SQUARES_ROUNDING",
-    "Prepared",
-    "Solution",
-    "adjust",
-    "cholesky",
-    "corrected_unknowns",
-    "gauss_newton_step",
-    "inner_constraints",
-    "normals",
-    "prepare",
-    "prior",
-    "similarity",
-    "with_datum",
-    "without_datum",
-]
-
 MAX_ITERATIONS = 100
 """Iterations of an adjustment."""
 

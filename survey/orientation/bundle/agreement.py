@@ -15,21 +15,6 @@ from survey.orientation.bundle.start import start_values, without_start
 from survey.orientation.network import Control, Network, listed
 from survey.orientation.projection import project
 
-__all__ = [
-    "AGREE",
-    "ENOUGH",
-    "POOR",
-    "SEARCHES",
-    "adjusted_alone",
-    "contradicted_control",
-    "exchanged_control",
-    "fitted_places",
-    "median_misfit",
-    "sigma0_of",
-    "useful_marks",
-    "with_marks",
-]
-
 POOR = 3e-3
 """Median residual over the longer side of a photograph, beyond which an orientation is none."""
 

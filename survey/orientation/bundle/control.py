@@ -11,8 +11,6 @@ from survey.orientation.bundle.start import FLAT
 from survey.orientation.bundle.statistics import Statistics
 from survey.orientation.network import Network, Photo
 
-__all__ = ["FAR_OFF", "MISSES", "control_remarks", "control_tests"]
-
 MISSES = 2.33
 """√(χ²₃ / 3) that a sound point exceeds once in a thousand cases."""
 

@@ -27,8 +27,6 @@ from survey.orientation.bundle.statistics import CRITICAL, statistics
 from survey.orientation.network import INTERIOR, Camera, Control, Network, Photo, listed
 from survey.orientation.projection import directions
 
-__all__ = ["Healed", "healed", "without_photo"]
-
 _OTHER_LENS = ("c", "K1")
 """What is estimated of the lens of a photograph that may have been taken by another."""
 

@@ -30,8 +30,6 @@ from survey.orientation.bundle.adjustment import (
 )
 from survey.orientation.network import Network, PlumbLine, ScaleBar
 
-__all__ = ["LengthFit", "check_lengths", "fit_lengths", "with_lengths"]
-
 _BATCH = len(SIMILARITY)
 """Functions of the points whose covariances one loop of the kernel sums: it is compiled for those of the datum."""
 

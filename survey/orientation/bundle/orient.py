@@ -35,8 +35,6 @@ from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistic
 from survey.orientation.network import Control, Network, Photo, listed
 from survey.orientation.projection import project
 
-__all__ = ["Blunders", "Orientation", "orient"]
-
 Blunders = Literal["report", "remove"]
 """Treatment of marks that the test finds wrong."""
 

@@ -14,15 +14,6 @@ from numpy.typing import NDArray
 
 from survey.arrays import Array
 
-__all__ = [
-    "TRIPLES",
-    "essential_orientations",
-    "intersect_many",
-    "intersect_rays",
-    "resect",
-    "similarity_between",
-]
-
 TRIPLES = 60
 """Random triples tried: with half of the points wrong, one is free of them but once in (8/7)⁶⁰ = 3,000 cases."""
 

@@ -6,8 +6,6 @@ from ground.errors import SurveyError
 from survey.orientation.network import Camera, Network, listed
 from survey.orientation.projection import corrected
 
-__all__ = ["check_cameras", "check_network"]
-
 _PIXELS_MM = (5e-4, 0.5)  # sizes of pixels, of sensors and of scanned plates [mm]
 _ANGLES = (0.25, 60.0)  # camera constant over the longer side of the photograph: from 127° to telescopes
 _DISTORTED = 0.5  # distortion in the corners over their distance from the principal point

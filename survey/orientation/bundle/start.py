@@ -21,8 +21,6 @@ from survey.orientation.bundle.resection import (
 from survey.orientation.network import Network, Photo
 from survey.orientation.projection import directions
 
-__all__ = ["FLAT", "aligned", "check_mirrored", "start_values", "swapped", "without_start"]
-
 FLAT = 5e-3
 """Extent of control points off their plane over that in it, below which mirrored ones fit as well."""
 

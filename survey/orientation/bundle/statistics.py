@@ -29,8 +29,6 @@ from survey.orientation.bundle.lengths import LengthFit, fit_lengths
 from survey.orientation.network import Network
 from survey.orientation.rotations import angle_slopes
 
-__all__ = ["CRITICAL", "Statistics", "photo_precision", "statistics"]
-
 CRITICAL = 3.29
 """Two-sided normal quantile of Baarda's α₀ = 0.1 %, beyond which a standardised residual is a blunder."""
 

@@ -23,8 +23,6 @@ from survey.orientation.formats.marks import marked_well, marks_of_points, numbe
 from survey.orientation.formats.opencv import interior
 from survey.orientation.network import Camera, Network, Photo
 
-__all__ = ["read_colmap", "write_colmap"]
-
 _MODELS = {
     "SIMPLE_PINHOLE": ("f", "cx", "cy"),
     "PINHOLE": ("fx", "fy", "cx", "cy"),

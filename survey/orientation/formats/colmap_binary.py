@@ -16,8 +16,6 @@ from ground.errors import SurveyError
 from ground.tables.numbers import unreadable
 from survey.arrays import Array, Ints
 
-__all__ = ["MODELS", "BinaryImage", "binary_cameras", "binary_images", "binary_points"]
-
 MODELS: Mapping[int, tuple[str, int]] = {
     0: ("SIMPLE_PINHOLE", 3),
     1: ("PINHOLE", 4),

@@ -20,8 +20,6 @@ from ground.tables.table import Table, TableRow, read_table
 from survey.arrays import Array
 from survey.orientation.network import Control, Network, listed
 
-__all__ = ["ControlRow", "read_control", "with_control", "write_control"]
-
 _COLUMNS: Mapping[str, Sequence[str]] = {
     **COORDINATES,
     "number": POINT,

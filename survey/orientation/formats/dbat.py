@@ -31,8 +31,6 @@ from survey.orientation.formats.xml_lines import Element, read_xml
 from survey.orientation.network import INTERIOR, Camera, Network, Photo, listed
 from survey.orientation.rotations import angles, from_angles
 
-__all__ = ["read_dbat", "write_dbat"]
-
 _PARTS = {
     "cc": ("c",),
     "pp": ("xp", "yp"),

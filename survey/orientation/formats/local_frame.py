@@ -6,8 +6,6 @@ import numpy as np
 
 from survey.arrays import Array
 
-__all__ = ["LocalFrame"]
-
 _AXIS, _FLATTENING = 6378137.0, 1.0 / 298.257223563  # of the ellipsoid of WGS 84 [m], [-]
 
 

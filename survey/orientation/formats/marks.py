@@ -17,8 +17,6 @@ from ground.tables.table import Table, read_table
 from survey.arrays import Array
 from survey.orientation.network import Camera, Network, Photo, listed
 
-__all__ = ["MarkRow", "marked_well", "marks_of_points", "network_of", "numbered", "read_marks", "write_marks"]
-
 _COLUMNS: Mapping[str, Sequence[str]] = {
     "photograph": (
         *("photograph", "photo", "image", "img", "picture", "file", "camera", "Bild", "Foto", "Aufnahme"),

@@ -22,8 +22,6 @@ from survey.orientation.formats.marks import marked_well, marks_of_points
 from survey.orientation.formats.xml_lines import Element, read_xml
 from survey.orientation.network import Camera, Control, Network, Photo
 
-__all__ = ["read_metashape", "write_metashape"]
-
 _FLIP = np.diag([1.0, -1.0, -1.0])
 
 

@@ -14,8 +14,6 @@ from survey.arrays import Array
 from survey.orientation.formats.xml_lines import read_xml
 from survey.orientation.network import Camera
 
-__all__ = ["interior", "read_calibration"]
-
 _COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3")  # further ones belong to other models
 _FIRST_PIXEL = 0.5  # place of the middle of the first pixel [px]
 _NAMES = {

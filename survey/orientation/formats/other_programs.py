@@ -5,8 +5,6 @@ from pathlib import Path
 
 from ground.errors import SurveyError
 
-__all__ = ["refuse_other_programs"]
-
 _HEAD = 4096  # bytes in which a file tells what it is
 _MARKS = (
     "write its marks as a table (photograph, point, x, y in pixels from the upper left corner), and its camera under "

@@ -28,8 +28,6 @@ from survey.orientation.formats.marks import numbered
 from survey.orientation.network import Camera, Control, Network, Photo
 from survey.orientation.rotations import angles, from_angles
 
-__all__ = ["read_photomodeler", "write_photomodeler"]
-
 _COARSE = 1.5e-3  # half of the last digit of a camera repeated for a photograph, with a margin [mm]
 
 

@@ -21,8 +21,6 @@ from survey.orientation.network import INTERIOR, Camera, Photo
 from survey.orientation.oriented import Oriented
 from survey.orientation.rotations import angles, from_angles
 
-__all__ = ["orientation_values", "read_orientation", "write_orientation"]
-
 _CORRELATED = 0.95  # correlation from which two parameters are named
 _ANGLES = ("omega", "phi", "kappa", "x", "y", "z")
 

@@ -8,8 +8,6 @@ from xml.parsers import expat
 from ground.errors import SurveyError
 from ground.tables.numbers import parse_number, shown, unreadable
 
-__all__ = ["Element", "read_xml"]
-
 
 @dataclass
 class Element:

@@ -20,8 +20,6 @@ from survey.orientation.oriented import Oriented
 from survey.orientation.projection import directions, project
 from survey.orientation.stones.located import Located, Mark, Sight, line_up
 
-__all__ = ["intersect", "sight"]
-
 _MAX_ITERATIONS = 20  # iterations
 _STILL = 1e-11  # movement of a point over its distance, below which it has converged
 _NARROWEST = 1.0  # angle between the outer rays of a point below which it is refused [°]

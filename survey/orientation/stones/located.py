@@ -15,8 +15,6 @@ from survey.arrays import Array
 from survey.orientation._kernels.camera import PARAMETERS, ray
 from survey.orientation.oriented import Oriented
 
-__all__ = ["Located", "Mark", "Sight", "joint_covariance", "line_up"]
-
 
 @dataclass(frozen=True)
 class Mark:

@@ -21,8 +21,6 @@ from survey.orientation.stones.plotting import plot
 from survey.orientation.stones.surfaces import Surface, fit_surface
 from survey.records.survey import BlockRecord, PointMark, Reject, SolidRecord, SurfaceRule, SurveyHead
 
-__all__ = ["located_stones"]
-
 _MIN_SIGMA = 1e-5  # standard deviation along the normal below which a point counts no more [m]
 
 Item = BlockRecord | SolidRecord | Reject

@@ -19,8 +19,6 @@ from survey.orientation.stones.intersection import sight
 from survey.orientation.stones.located import Located, Mark, line_up
 from survey.orientation.stones.surfaces import Surface
 
-__all__ = ["plot"]
-
 _GRAZING = 10.0  # flattest useful line of sight [°]
 
 

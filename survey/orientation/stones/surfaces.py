@@ -12,8 +12,6 @@ from survey.faces.planes import FaceFit, fit_plane
 from survey.orientation.oriented import Oriented
 from survey.orientation.stones.located import Located, joint_covariance
 
-__all__ = ["Cylinder", "Plane", "Surface", "fit_surface"]
-
 _MIN_CYLINDER_POINTS = 6  # points of a cylinder: five parameters, and one that checks them
 _DIRECTIONS = 300  # directions of the axis tried
 _TRIED = 6  # of these, the best, from which the fit starts

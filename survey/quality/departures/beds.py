@@ -38,8 +38,6 @@ from survey.quality.departures.shapes import (
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
-__all__ = ["CHANCE", "BedKind", "BedMovement", "OddBed", "WallBeds", "find_bed_movements", "measure_beds"]
-
 CHANCE = 0.003
 """Probability that the beds of a survey without any movement are given one."""
 

@@ -14,8 +14,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.quality.departures.shapes import Found, Sample
 
-__all__ = ["bulge_profile", "with_extent_and_profile"]
-
 _FADING = 0.75  # ρ over r of the two profiles that are most alike about a common plane [-]
 
 

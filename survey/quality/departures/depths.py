@@ -19,8 +19,6 @@ from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.records.survey import DepthRule
 
-__all__ = ["DoubtfulDepth", "doubtful_depths"]
-
 _ENOUGH = 5  # least number of stones for a median and its scatter
 _DEPTH_SCATTER = 0.12  # scatter of depths that needs no reason, over the depth [-]
 _WITHOUT = 0.25  # standard deviation of a rule that states none, over its depth [-]

@@ -39,8 +39,6 @@ from survey.quality.departures.shapes import (
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
-__all__ = ["FaceKind", "FaceMovement", "OddStone", "WallFace", "find_face_departures"]
-
 _JOINED = 0.10  # departure of neighbours from each other's plane within which they are of one wall [m]
 _WALL = 6  # least number of stones of a wall of its own; fewer stand out of the one behind them
 _NEIGHBOURS = 10  # neighbours with which a stone is compared

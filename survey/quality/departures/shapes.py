@@ -21,21 +21,6 @@ from scipy.special import stdtr, stdtrit
 
 from survey.arrays import Array
 
-__all__ = [
-    "FINEST",
-    "LEAST",
-    "LIKELY",
-    "MOST",
-    "Found",
-    "Run",
-    "Sample",
-    "Shape",
-    "critical",
-    "fit_shapes",
-    "millimetres",
-    "powers",
-]
-
 FINEST = 1e-4
 """Standard deviation that no bed and no face is known better than [m]: a tenth of a millimetre."""
 

@@ -19,20 +19,6 @@ from enum import StrEnum
 
 from scipy.special import ndtr
 
-__all__ = [
-    "DIRECTIONS",
-    "PARAMETERS",
-    "UNKNOWN",
-    "Direction",
-    "Grade",
-    "Parameter",
-    "category",
-    "given_grade",
-    "graded",
-    "index_range",
-    "mechanical_ranges",
-]
-
 
 class Direction(StrEnum):
     """Directions of loads."""

@@ -17,8 +17,6 @@ from scipy.sparse.csgraph import dijkstra
 
 from survey.arrays import Array
 
-__all__ = ["minimum_traces", "section_trace"]
-
 _JOINT = 0.08  # widest joint between two stones [m]; beyond is an opening, or the end of the wall
 _HEIGHTS = (0.7, 1.5)  # straight distances at which it is measured, about a metre [m]; their mean is taken
 _MIN_DISTANCE = 0.5  # least straight distance: of a low wall [m]

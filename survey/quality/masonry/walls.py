@@ -42,8 +42,6 @@ from survey.quality.masonry.index import (
 )
 from survey.quality.masonry.trace import minimum_traces, section_trace
 
-__all__ = ["MasonryQuality", "WallStone", "judge_masonry"]
-
 _MIN_WALL_STONES = 8  # least number of stones of a wall
 _ARCH = frozenset({"voussoir", "keystone", "springer", "rib_segment", "boss", "rib_springer", "web_stone"})
 _SIZES = (0.20, 0.40)  # sides of small and of large stones [m]

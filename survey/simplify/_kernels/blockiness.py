@@ -11,8 +11,6 @@ from numba import njit
 
 from survey.geometry._kernels.vectors import dot
 
-__all__ = ["area_vectors", "common_volume", "edge_distances", "face_planes", "volume", "worst_angle"]
-
 
 @njit(cache=True)
 def area_vectors(vertices, corners, starts):

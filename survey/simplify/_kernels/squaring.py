@@ -6,8 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-__all__ = ["Bounds", "square"]
-
 _STRAIGHT = 0.34  # sine of 20°: turn of a corner below which it may lie half-way along a side
 _PARALLEL = 1e-9  # sine below which two sides do not meet
 

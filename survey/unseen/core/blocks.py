@@ -12,9 +12,6 @@ from survey.unseen.core.courses import Stretch, Strip, height_of, place_of, stre
 from survey.unseen.core.facings import FacingStone, FacingWall
 from survey.unseen.core.settings import InfillSettings
 
-__all__ = ["CoreBlock", "core_blocks"]
-
-
 _OUT = np.array([0.0, 0.0, 1.0])
 _ON_PLANE = 1e-10  # metres: distance within which corners lie on a plane
 _NOTHING = 1e-11  # cubic metres: smallest volume

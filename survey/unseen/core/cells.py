@@ -10,8 +10,6 @@ from scipy.ndimage import label
 from survey.arrays import Array, Bools
 from survey.geometry.solids import Solid
 
-__all__ = ["CellGrid", "grid_solids"]
-
 Node = tuple[int, int, int]
 
 # corners of each side of a cell, counter-clockwise seen from outside; axes: along, up, from the front to the back

@@ -12,9 +12,6 @@ from survey.arrays import Array
 from survey.unseen.core.facings import FacingStone, FacingWall
 from survey.unseen.core.settings import InfillSettings
 
-__all__ = ["Stretch", "Strip", "height_of", "place_of", "stretches", "strips"]
-
-
 _ALONG, _UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 _OFF_BED = 0.03  # metres: distance from the bed of its course above which a corner is left out
 

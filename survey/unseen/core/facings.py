@@ -17,8 +17,6 @@ from survey.geometry.solids import Solid, area_vector
 from survey.quality.facades import WallPlane, upright_frame
 from survey.unseen.core.settings import InfillSettings
 
-__all__ = ["FacingStone", "FacingWall", "facing_stone", "find_walls", "wall_between"]
-
 Indices = NDArray[np.intp]
 
 _CONVEX = 1e-7  # metres: height of a corner of a convex solid in front of a face

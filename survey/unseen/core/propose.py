@@ -17,8 +17,6 @@ from survey.unseen.core.facings import FacingStone, FacingWall, find_walls, wall
 from survey.unseen.core.settings import InfillSettings, InfillShape
 from survey.unseen.core.storeys import core_storeys
 
-__all__ = ["InfillProposal", "propose_infill"]
-
 
 @dataclass(frozen=True)
 class InfillProposal:

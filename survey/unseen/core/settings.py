@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["InfillSettings", "InfillShape"]
-
 
 class InfillShape(StrEnum):
     """Make of the core of a wall.

@@ -18,8 +18,6 @@ from survey.unseen.core.courses import Strip, height_of, stretches, strips
 from survey.unseen.core.facings import FacingStone, FacingWall
 from survey.unseen.core.settings import InfillSettings
 
-__all__ = ["CoreStorey", "core_storeys"]
-
 Interval = tuple[float, float]
 
 _OUT = np.array([0.0, 0.0, 1.0])

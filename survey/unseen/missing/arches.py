@@ -13,8 +13,6 @@ from survey.arrays import Array
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line, line_through, meeting
 
-__all__ = ["ArchGap", "arch_gaps", "voussoir_outlines"]
-
 Ends = tuple[int, int]
 
 _WEDGES = {"voussoir", "keystone"}

@@ -15,9 +15,6 @@ from survey.faces.shapes import FaceShape, ShapeKind
 from survey.records.survey import BlockRecord
 from survey.unseen.missing.sides import Elevation, FlatStone
 
-__all__ = ["MissingFace", "is_plausible", "stone_of"]
-
-
 _SHORTEST = 0.05  # metres: least length of a side
 _ENOUGH = 3  # least number of faces for a common plane
 

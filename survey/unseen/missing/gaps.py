@@ -11,9 +11,6 @@ from survey.arrays import Array, Ints
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line
 
-__all__ = ["CourseGap", "Gaps", "Hole", "find_gaps", "find_holes", "opening_signs"]
-
-
 _UP, _DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
 _LEVEL = np.array([1.0, 0.0])
 _AROUND = 4  # stones of the course that define the beds beside a gap

@@ -23,9 +23,6 @@ from survey.unseen.missing.gaps import CourseGap
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone
 
-__all__ = ["Filling", "UsualKind", "depth_of_kind", "likeliest", "split", "usual_kinds"]
-
-
 _PARTICULAR = {
     "jamb",
     "sill",

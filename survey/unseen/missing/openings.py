@@ -13,8 +13,6 @@ from survey.unseen.missing.gaps import CourseGap, Hole
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation
 
-__all__ = ["FrameGap", "frame_gaps"]
-
 _ENOUGH = 2  # least number of jambs on one side that show the edge of the opening
 _STRAIGHT = 0.03  # metres by which they may differ
 _OF_ARCHES = {"voussoir", "keystone", "springer"}

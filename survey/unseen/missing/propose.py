@@ -23,9 +23,6 @@ from survey.unseen.missing.openings import FrameGap, frame_gaps
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line, elevations, meeting
 
-__all__ = ["MissingStone", "propose_missing"]
-
-
 _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0])
 _USUAL_JOINT = 0.01  # metres, where no joint can be measured
 _SCATTER = 0.003  # metres: standard deviation of a stone's end about the middle of its joint

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = ["MissingSettings"]
-
 
 @dataclass(frozen=True)
 class MissingSettings:

@@ -14,9 +14,6 @@ from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.neighbours import Neighbours
 from survey.quality.facades import WallPlane, find_facades
 
-__all__ = ["Elevation", "FlatStone", "Line", "elevations", "line_through", "meeting"]
-
-
 _FACING = float(np.cos(np.radians(50.0)))  # cosine of 50°: largest angle of a side from its direction
 _NEARLY = float(np.cos(np.radians(12.0)))  # cosine of 12°: largest turn of a side by wear
 _LAYER = 0.5  # metres: least distance of two walls that face the same way

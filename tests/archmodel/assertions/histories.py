@@ -31,8 +31,6 @@ from ground.errors import UsageError
 from tests.archmodel.migrations import next_version
 from tests.archmodel.stones import SHA, box_stone
 
-__all__ = ["FIRST", "PHASES", "History"]
-
 CODES = ("A", "B", "C")
 AUTHORS = ("Ada", "Ben", "Cleo", None)
 PHASES = {"I": 1100, "II": 1200, "III": 1300}

@@ -11,7 +11,8 @@ import pytest
 from archmodel.assertions.register_kind import register_kind
 from archmodel.database.session import Database
 from archmodel.describe.schema_tree import schema
-from archmodel.query.api import attributes, condition, find, find_rows
+from archmodel.query.api import attributes, find, find_rows
+from archmodel.query.compile import condition
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import (
     Entity,

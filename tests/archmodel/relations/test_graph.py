@@ -11,14 +11,8 @@ from sqlalchemy import select
 from archmodel.assertions.withdraw import withdraw_relations
 from archmodel.database.as_known import as_known
 from archmodel.database.session import open_database
-from archmodel.relations.graph import (
-    carried_by,
-    carries,
-    courses_in_order,
-    load_path,
-    neighbours,
-    stones_near,
-)
+from archmodel.relations.graph import carried_by, carries, courses_in_order, neighbours, stones_near
+from archmodel.relations.load_paths import load_path
 from archmodel.store.bulk import insert_rows
 from archmodel.tables.entities import Entity
 from archmodel.tables.entries import new_entry

@@ -4,8 +4,6 @@ from pathlib import Path
 
 from archmodel.stratigraphy.palette import UNIT_KINDS
 
-__all__ = ["artifact", "drawing", "group", "line", "other", "shape"]
-
 _SPACES = "xmlns='http://graphml.graphdrawing.org/xmlns' xmlns:y='http://www.yworks.com/xml/graphml'"
 _KEYS = (
     "<key id='d4' for='node' attr.name='url' attr.type='string'/>"

@@ -6,9 +6,8 @@ import numpy as np
 
 from mechanics.contact.face_meshes import FaceMesh
 from mechanics.contact.surfaces import Placed, middles, surfaces
-from tests.pipelines.results_by_hand import BOX_FACES, box
-
-__all__ = ["BOTTOM", "KINDS", "TOP", "grid_mesh", "nodes_of", "two_boxes"]
+from mechanics.scene.shapes import BOX_FACES
+from tests.pipelines.results_by_hand import box
 
 KINDS = (3, 4, 6, 8, 9)
 # the faces z = low and z = high of a box

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["clip", "moments", "overlap"]
-
 
 def clip(polygon, origin, normal):
     """What lies below the plane through `origin` of a polygon (n, 3), edge after edge (Sutherland & Hodgman 1974)."""

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.contact.contacts import gaps
 from mechanics.contact.detection import Detector
+from mechanics.delassus._kernels.mixed import ELASTIC, NONE, RIGID
 from mechanics.delassus.assembly import local_velocity, world_impulse
-from mechanics.delassus.mixed import ELASTIC, NONE, RIGID
 from mechanics.dynamics.contact_problem import contact_problem
 from mechanics.dynamics.contact_search import detection
 from mechanics.dynamics.handover import of_run

@@ -11,7 +11,7 @@ from threadpoolctl import ThreadpoolController
 from ground.errors import SolverError
 from mechanics.delassus import elimination, multifrontal
 from mechanics.delassus._kernels.fronts import add_into, solve
-from mechanics.delassus.mixed import ELASTIC
+from mechanics.delassus._kernels.mixed import ELASTIC
 from mechanics.delassus.mixed_form import mixed_fronts
 from mechanics.delassus.multifrontal import Cliques, fronts
 from mechanics.scene.scene import Fidelity

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mechanics.model.deformable import Compliance, deformable, dissection
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.elasticity.tensors import from_voigt, von_mises
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TURN
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 STEP, THETA = 1e-3, 0.7
 

@@ -16,8 +16,9 @@ from mechanics.scene.loads.load import Loads
 from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from mechanics.scene.scene import Fidelity, Part
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.simulate import simulate
-from tests.mechanics.shapes import BOX_FACES, brick, detected, ground, moved, scene
+from tests.mechanics.shapes import brick, detected, ground, moved, scene
 from tests.pipelines.results_by_hand import box
 
 G, DENSITY = 9.81, 2000.0

@@ -6,9 +6,10 @@ import pytest
 from ground.errors import GeometryError, SceneError
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.materials import Material
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, ellipse, ground, moved, prism, scene
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 
 def test_a_scene_needs_a_block():

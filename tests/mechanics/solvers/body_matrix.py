@@ -4,8 +4,6 @@ import numpy as np
 
 from mechanics.solvers._kernels.body_cholesky import postorder
 
-__all__ = ["dense_and_panels", "strip"]
-
 
 def strip(length, width=3):
     """Return pairs of bodies of a strip that touch, in an order of elimination in which cuts come last."""

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from scipy.spatial import ConvexHull
 
 from ground.errors import GeometryError
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.polyhedra import (
     alike,
     face_plane,
@@ -17,7 +18,7 @@ from mechanics.stones.polyhedra import (
     smallest_widths,
 )
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, hexahedra
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 SIDES = np.array([0.7, 0.4, 0.3])
 CORNER = np.array([[0.0, 0, 0], [0.6, 0, 0], [0, 0.9, 0], [0, 0, 1.2]])

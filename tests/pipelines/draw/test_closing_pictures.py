@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
+from mechanics.scene.shapes import BOX_FACES
 from pipelines.draw.closing_pictures import (
     closing_surface,
     draw_elevations,
@@ -22,7 +23,7 @@ from survey.joints.report import ClosingReport, Gap, Overlap, StoneJoint
 from survey.joints.settings import JointMode
 from synthetic.buildings.quoins import corner
 from synthetic.buildings.vaults import barrel_vault
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 pytestmark = pytest.mark.draws
 AWAY = np.array([0.0, -1.0, 0.0])

@@ -12,8 +12,6 @@ from ground.errors import DatabaseError
 from mechanics.dynamics.progress import Progress
 from pipelines.ingest.ingest import ingest
 
-__all__ = ["Ingest", "wall_survey"]
-
 _CONTEXT = multiprocessing.get_context("forkserver")
 _CONTEXT.set_forkserver_preload(["tests.pipelines.ingest.one_ingest", "psycopg"])
 

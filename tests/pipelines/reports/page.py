@@ -2,8 +2,6 @@
 
 from html.parser import HTMLParser
 
-__all__ = ["Page"]
-
 VOID = ("meta", "img", "link", "input", "br")
 OWN = ("module", "application/json", "application/octet-stream")
 """Types of the scripts and data of the viewer."""

@@ -1,7 +1,5 @@
 """Summaries of an assessment and of a loading test, as their files hold them, with numbers that are known."""
 
-__all__ = ["assessed", "pushed"]
-
 INPUTS = {
     "Survey": [
         "wall: 3 stones; /home/surveyor/projects/2026/north/wall-of-the-north-aisle-second-campaign.moma"

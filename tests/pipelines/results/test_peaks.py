@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.results.result import JointSeries, Largest, Outcome, Peak, Peaks, Series
+from mechanics.dynamics.outcome import Outcome
+from mechanics.results.result import JointSeries, Largest, Peak, Peaks, Series
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, LawRule

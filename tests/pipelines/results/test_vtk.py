@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from pipelines.draw.offscreen.surfaces import wall_surface
 from pipelines.results.vtk import contact_grid, write_frames, write_joint_grid
 from pipelines.results.vtu import CELL_TYPES
-from tests.pipelines.results_by_hand import BOX_FACES, LIMESTONE, box, contacts_of, meshed_body, result_of
+from tests.pipelines.results_by_hand import LIMESTONE, box, contacts_of, meshed_body, result_of
 
 
 def read_array(node):

@@ -12,8 +12,6 @@ from pipelines.scene.stages import STAGE_KEYS
 from pipelines.scene.tables import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.toml.schema import REQUIRED, Key
 
-__all__ = ["SECTIONS", "with_tables"]
-
 _HEAD = ("| key | unit | default | meaning |", "|---|---|---|---|")
 _HEADING = re.compile(r'(##|###) `(?:type = "(\w+)"|(\[.+\]))`')
 

@@ -8,12 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechanics.scene.scene import Block, Fidelity, Method, Placement
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.materials import Material
 from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import parse_scene
 from pipelines.tradeoff.grid import grid, setting_name
 from pipelines.tuning.overlay import Overlay, overlaid, overlay_from, overlay_record, scene_lines
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 STONE = Material("limestone", 2350.0, 12e9, 0.2)
 PLAIN = "[materials.limestone]\ndensity = 2350.0\nyoung = 12e9\npoisson = 0.2\n"

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from survey.formats.reading import ReadingOptions, read_survey
+from survey.formats.options import ReadingOptions
+from survey.formats.reading import read_survey
 from tests.moma.commands import prints
 from tests.survey.scanned_stones import scanned_box, write_ply
 

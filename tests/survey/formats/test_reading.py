@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from ground.errors import UsageError
-from survey.formats.reading import FORMATS, ReadingOptions, open_survey, read_head, read_survey
+from survey.formats.native.reader import read_head
+from survey.formats.options import ReadingOptions
+from survey.formats.reading import FORMATS, open_survey, read_survey
 from survey.records.survey import BlockRecord
 from tests.survey.formats.survey_files import CSV, EXAMPLES, MOMA, PNEZD
 

@@ -19,7 +19,8 @@ from survey.geometry.watertight import check_watertight
 from survey.joints.close import ClosedStones, close_joints
 from survey.joints.settings import JointMode, JointSettings
 from survey.records.survey import BlockRecord
-from survey.simplify.simplify import BlockShape, simplify
+from survey.simplify.result import BlockShape
+from survey.simplify.simplify import simplify
 from synthetic.buildings.window import make_window
 from tests.survey.plain_blocks import DEPTH, as_stone, box, cuboid, drawn, moved, stone
 from tests.survey.unseen.statics import contact_area, contacts, near_pairs, overlap_depth, side_planes

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from survey.orientation.network import INTERIOR, Camera, Control, Network, Photo
+from survey.orientation.network import Camera, Control, Network, Photo
 from survey.orientation.projection import project
 from survey.orientation.rotations import from_angles
 
@@ -108,6 +108,3 @@ def spread_points(truth, count):
         far = np.min(np.linalg.norm(place[:, None] - place[found][None], axis=2), axis=1)
         found.append(int(np.argmax(far)))
     return found
-
-
-__all__ = ["INNER", "INTERIOR", "Truth", "looking", "noisy", "spread_points", "wall_block", "with_points"]

@@ -15,7 +15,8 @@ from survey.formats.solids.reader import open_solids
 from survey.geometry.solids import Solid, planes_of_solid
 from survey.geometry.watertight import check_watertight, triangulate
 from survey.records.survey import SolidRecord
-from survey.simplify.simplify import BlockShape, BlockyStone, simplify
+from survey.simplify.result import BlockShape
+from survey.simplify.simplify import BlockyStone, simplify
 from tests.survey.simplify import report_twin as twin
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -16,7 +16,9 @@ from survey.faces.faces import outline_face
 from survey.geometry.watertight import check_watertight
 from survey.records.survey import BlockRecord, Extrusion
 from survey.simplify.blockiness import about
-from survey.simplify.simplify import BlockShape, BlockyStone, SimplifyBounds, simplify
+from survey.simplify.result import BlockShape
+from survey.simplify.simplify import BlockyStone, simplify
+from survey.simplify.squaring import SimplifyBounds
 from tests.paths import ROOT
 from tests.survey.simplify import report_twin as twin
 

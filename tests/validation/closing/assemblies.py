@@ -16,9 +16,6 @@ from survey.extrusion.extrusion import prism
 from survey.geometry.solids import Solid
 from synthetic.true_joints import TrueJoint, true_joints
 
-__all__ = ["RoundedAssembly", "angled_pier", "hexagonal_dome", "rounded"]
-
-
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))  # turn from point to point of a spiral that fills a sphere evenly
 _NEAR = 14  # nearest points that include all neighbours of one on the sphere
 _SAME = 1e-9  # distance of identical corners, due to rounding [m]

@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-__all__ = ["published"]
-
 _TITLE = "## 14. Extremes"
 
 

@@ -20,8 +20,6 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene, Solve
 from mechanics.simulate import simulate
 from mechanics.stones.materials import Material, Orthotropy
 
-__all__ = ["refusals"]
-
 Run = Callable[[], object]
 
 _NAN, _INF = float("nan"), float("inf")

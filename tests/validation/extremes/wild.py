@@ -6,8 +6,6 @@ from mechanics.arrays import Array
 from mechanics.delassus.rigid import RigidDelassus, schedule
 from mechanics.problem.problem import ContactProblem
 
-__all__ = ["wild_problem"]
-
 
 def wild_problem(seed: int, decades: float) -> ContactProblem:
     """Up to six bodies and a fixed one with up to twenty contacts between any two of them.

@@ -14,8 +14,6 @@ from pipelines.ingest.reading_options import reading_options, solid_options
 from tests.paths import ROOT
 from tests.pipelines.scenes import assembled
 
-__all__ = ["ASSEMBLIES", "MODELS", "REFUSED", "Model", "model"]
-
 ASSEMBLIES = ROOT.parent / "shared/data/assemblies"
 _SCENE = """
 [scene]

@@ -10,8 +10,9 @@ from mechanics.dynamics.outcome import Outcome
 from mechanics.limit.assembly import assembly
 from mechanics.limit.dead_load import stands
 from mechanics.simulate import simulate
-from tests.validation.one_answer.matrix import SETTINGS, Mark, Setting, answer, at, rotating
+from tests.validation.one_answer.matrix import SETTINGS, Setting, answer, at, rotating
 from tests.validation.one_answer.scenes import SCENES, WEDGE, wedge_on_two_planes
+from tests.validation.wild.matrix import Mark
 from tests.validation.wild.scene_list import Truth
 
 HARMLESS = (Mark.RIGHT, Mark.OPEN)

@@ -10,8 +10,6 @@ from mechanics.planar.simulation import PlanarSimulation
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import Method, SolverSettings
 
-__all__ = ["FLOOR", "G", "ball", "run", "start", "steps_of"]
-
 G = 9.81
 FLOOR = Wall("floor", (-100.0, 0.0), (100.0, 0.0))
 

@@ -18,7 +18,8 @@ from pipelines.run.check import check_scene
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
-from survey.formats.native.reader import read_moma, write_moma
+from survey.formats.native.reader import read_moma
+from survey.formats.native.writer import write_moma
 from survey.formats.reading import open_survey
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints

@@ -13,7 +13,8 @@ import pytest
 import trimesh
 
 from ground.errors import MomaError
-from survey.formats.reading import ReadingOptions, open_survey
+from survey.formats.options import ReadingOptions
+from survey.formats.reading import open_survey
 from survey.records.survey import BlockRecord, Reject, SolidRecord
 
 CORNERS = [(10.0, 2.0, 0.5), (10.6, 2.0, 0.5), (10.6, 2.0, 0.8), (10.0, 2.0, 0.8)]

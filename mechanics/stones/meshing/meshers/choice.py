@@ -2,8 +2,6 @@
 
 from enum import StrEnum
 
-__all__ = ["Mesher"]
-
 
 class Mesher(StrEnum):
     """Mesher of tetrahedra: Delaunay for convex stones and gmsh for others, or one to try first for all stones."""

@@ -20,8 +20,6 @@ from mechanics.stones.meshing.sizes import SizeField, as_field
 from mechanics.stones.meshing.soundness import CONVEX
 from mechanics.stones.polyhedra import face_planes
 
-__all__ = ["mesh_with_delaunay"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 # on a regular lattice four points lie on a plane and five on a sphere, where Delaunay makes flat tetrahedra

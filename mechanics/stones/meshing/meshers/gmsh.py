@@ -11,8 +11,6 @@ from mechanics.stones.meshing.mesh import SolidMesh, tet_mesh
 from mechanics.stones.meshing.meshers.slivers import improved
 from mechanics.stones.meshing.sizes import SizeField, as_field
 
-__all__ = ["Algorithm", "mesh_with_gmsh"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 # needed by gmsh's wheel on a bare Debian or Ubuntu

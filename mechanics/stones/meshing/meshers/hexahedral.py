@@ -8,8 +8,6 @@ from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import SolidMesh, solid_mesh
 from mechanics.stones.meshing.sizes import SizeField, as_field
 
-__all__ = ["mesh_with_hexahedra"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 _STATIONS = 64  # parts in which a direction is measured where the size changes

@@ -19,8 +19,6 @@ from mechanics.stones.meshing.sizes import SizeField, as_field, graded
 from mechanics.stones.meshing.soundness import check_meshable, is_convex
 from mechanics.stones.polyhedra import mass_properties
 
-__all__ = ["Meshable", "Meshed", "mesh_block", "meshed_block"]
-
 # scaled Jacobian below which a tetrahedron is a sliver, and another mesher is tried
 _POOR = 0.005
 # size of a second attempt over that of the first

@@ -9,8 +9,6 @@ from mechanics.stones.meshing.mesh import SolidMesh
 from mechanics.stones.meshing.meshers._kernels.shaping import improve
 from mechanics.stones.polyhedra import face_planes
 
-__all__ = ["improve_cells", "improved"]
-
 Faces = tuple[tuple[int, ...], ...]
 
 _GOOD = 0.4  # shape of tetrahedra that are left alone (1: regular, 0: flat)

@@ -14,8 +14,6 @@ from ground.errors import SceneError
 from mechanics.arrays import Array
 from pipelines.assess.study.settings import Shape
 
-__all__ = ["Distribution", "correlation_root"]
-
 _LEAST_EIGENVALUE = 1e-10
 """Least eigenvalue of a matrix of correlations that counts as positive: rounding of its entries leaves 10⁻¹⁵ [-]."""
 _SYMMETRIC = 1e-12  # largest difference of a correlation from its mirror image [-]

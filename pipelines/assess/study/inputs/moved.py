@@ -21,8 +21,6 @@ from survey.geometry.solids import Solid
 from survey.joints.close import closed_solids
 from survey.simplify.simplify import simplify
 
-__all__ = ["MovedStones"]
-
 
 @dataclass(frozen=True)
 class MovedStones:

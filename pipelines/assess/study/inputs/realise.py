@@ -18,8 +18,6 @@ from pipelines.scene.file import SceneFile, parse_scene
 from pipelines.scene.selection import StoneModel
 from pipelines.toml.writer import toml_text
 
-__all__ = ["GEOMETRY", "LAW_KEYS", "Realised", "changed_stones", "law_value", "realise", "records_of"]
-
 GEOMETRY = frozenset({InputType.DEPTH, InputType.PLANE, InputType.POINT, InputType.STATION})
 """Inputs that change the shape of stones, so that joints are closed again."""
 

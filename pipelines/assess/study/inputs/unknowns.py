@@ -14,8 +14,6 @@ from pipelines.assess.study.inputs.distributions import Distribution
 from pipelines.assess.study.settings import Acts, InputTable, InputType, Shape
 from pipelines.scene.selection import StoneModel
 
-__all__ = ["PLANE_PARTS", "Unknown", "Unknowns", "corner_sigmas", "expand"]
-
 PLANE_PARTS = ("tilt 1", "tilt 2", "height")
 """Unknowns of a plane, in the order of its covariance."""
 

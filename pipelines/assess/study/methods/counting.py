@@ -12,17 +12,6 @@ from scipy.stats import beta, norm, t
 
 from mechanics.arrays import Array
 
-__all__ = [
-    "Estimate",
-    "Probability",
-    "controlled",
-    "fragility",
-    "mean_of",
-    "probability",
-    "quantiles",
-    "reliability_index",
-]
-
 _FEW = 1e-300  # least probability whose reliability index is computed
 
 

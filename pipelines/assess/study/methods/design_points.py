@@ -18,8 +18,6 @@ from scipy.stats import norm
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate, Failure
 
-__all__ = ["Design", "design_point", "design_points"]
-
 _STILL = 1e-3
 """Change of the point at which it stands, and g over its change along one unit, at which it is zero [-].
 

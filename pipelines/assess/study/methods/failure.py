@@ -9,8 +9,6 @@ import numpy as np
 from mechanics.arrays import Array, Bools
 from pipelines.assess.workers.store import Sample
 
-__all__ = ["Evaluate", "Failure", "unknown"]
-
 
 class Evaluate(Protocol):
     """Function that takes samples at points."""

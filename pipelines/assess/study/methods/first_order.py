@@ -7,8 +7,6 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate
 
-__all__ = ["NOT_LINEAR", "FirstOrder", "Sides", "first_order", "regressed"]
-
 _MOST = 8
 """Unknowns that the linear prediction is tried along, the largest first."""
 

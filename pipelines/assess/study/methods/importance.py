@@ -13,8 +13,6 @@ from pipelines.assess.study.methods.design_points import Design
 from pipelines.assess.study.methods.failure import Evaluate, Failure
 from pipelines.assess.workers.store import Sample
 
-__all__ = ["Weighted", "importance"]
-
 
 @dataclass(frozen=True)
 class Weighted:

@@ -5,8 +5,6 @@ from scipy.stats import norm, qmc
 
 from mechanics.arrays import Array
 
-__all__ = ["latin_hypercube", "monte_carlo"]
-
 
 def monte_carlo(count: int, dimension: int, seed: int, stage: int = 0) -> Array:
     """Return independent points (count, dimension); each follows from the seed, the stage and its number alone.

@@ -10,8 +10,6 @@ from scipy.stats import norm, qmc, sobol_indices
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate
 
-__all__ = ["Indices", "sobol"]
-
 _RESAMPLES = 200  # of the bootstrap
 
 

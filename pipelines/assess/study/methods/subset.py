@@ -14,8 +14,6 @@ from mechanics.arrays import Array, Bools, Ints
 from pipelines.assess.study.methods.counting import Probability
 from pipelines.assess.study.methods.failure import Evaluate, Failure
 
-__all__ = ["Subset", "subset"]
-
 _SHARE = 0.1  # of the samples of a level from which the next begins [-]
 _CORRELATION = 0.8
 """Correlation of a move with the point before: less is refused too often, more moves too little [-]."""

@@ -10,8 +10,6 @@ from survey.arrays import Ints
 from survey.formats.solids.bodies import RawBody, check_coordinates, compact
 from survey.formats.solids.msh.sections import MshFile
 
-__all__ = ["msh_bodies"]
-
 
 def _sides(text: str) -> tuple[tuple[int, ...], ...]:
     """Return the corners of the sides of an element, each a word of their numbers."""

@@ -8,8 +8,6 @@ from ground.errors import SurveyError
 from ground.tables.numbers import shown
 from survey.arrays import Array, Ints
 
-__all__ = ["MshNumbers"]
-
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII).fullmatch
 _REMEDY = "export MSH 2.2 or 4.1"
 

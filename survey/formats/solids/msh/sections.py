@@ -14,8 +14,6 @@ from ground.tables.numbers import shown, unreadable
 from survey.arrays import Array, Ints
 from survey.formats.solids.msh.numbers import MshNumbers
 
-__all__ = ["Elements", "MshFile"]
-
 _COUNTS = "2 3 4 4 8 6 5 3 6 9 10 27 18 14 1 8 20 15 13 9 10 12 15 15 21 4 5 6 20 35"
 _NODES = dict(enumerate(map(int, _COUNTS.split()), start=1))  # number of nodes of each type of element
 _NAME = re.compile(r'\s*(\d+)\s+(-?\d+)\s+"(.*)"\s*', re.ASCII)

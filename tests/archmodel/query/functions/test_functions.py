@@ -4,7 +4,8 @@ import pytest
 from sqlalchemy import select
 
 from archmodel.database.session import Database
-from archmodel.query.api import condition, find, find_rows
+from archmodel.query.api import find, find_rows
+from archmodel.query.compile import condition
 from archmodel.tables.entities import Entity, Voussoir
 from ground.errors import QueryError
 from tests.archmodel.known_wall import furnish

@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.contact._kernels import narrow_phase as kernel
 from mechanics.contact.surfaces import surfaces
+from mechanics.scene.shapes import BOX_FACES
 from tests.mechanics.contact.polygons import clip, moments, overlap
 from tests.mechanics.shapes import ellipse, prism
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 FLAT, THIN = np.cos(np.radians(5.0)), 1e-6
 UP = np.array([0.0, 0.0, 1.0])

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.contact._kernels import narrow_phase as kernel
 from mechanics.contact.surfaces import surfaces
+from mechanics.scene.shapes import BOX_FACES
 from tests.mechanics.shapes import TURN, random_stone
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 # features that are as good are told apart by this part of the smaller stone's size, once among faces, once for edges
 EASE = 2e-3

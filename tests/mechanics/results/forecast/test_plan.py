@@ -4,8 +4,9 @@ import pytest
 
 from mechanics.results.forecast.plan import plan
 from mechanics.scene.scene import Block, ContactSettings, Fidelity, Scene
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.materials import Material
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 STONE = Material("stone", 2000.0, 1e10, 0.2)
 

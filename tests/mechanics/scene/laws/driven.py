@@ -8,8 +8,6 @@ from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import ENERGY, STATE
 from tests.mechanics.scene.laws.one_contact import approach
 
-__all__ = ["Driven"]
-
 
 @dataclass
 class Driven:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from ground.errors import SceneError
-from mechanics.scene.loads.record_files import read_accelerogram, read_at2, read_csv
+from mechanics.scene.loads.record_files import read_accelerogram, read_csv
+from mechanics.scene.loads.record_formats import read_at2
 
 ACCELERATION = 0.1 * np.sin(np.arange(12) / 2.0)  # [g]
 TITLE = "PEER NGA STRONG MOTION DATABASE RECORD"

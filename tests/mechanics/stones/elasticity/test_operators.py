@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.elasticity.operators import elastic_operators
 from mechanics.stones.elasticity.recovery import recovery
 from mechanics.stones.elasticity.stress import sampled_stress
@@ -13,7 +14,7 @@ from mechanics.stones.elasticity.tensors import from_voigt, to_voigt, von_mises
 from mechanics.stones.meshing.mesh import tet_mesh
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN
-from tests.pipelines.results_by_hand import BOX_FACES, box, box_mesh
+from tests.pipelines.results_by_hand import box, box_mesh
 
 LAME = LIMESTONE.young * LIMESTONE.poisson / ((1 + LIMESTONE.poisson) * (1 - 2 * LIMESTONE.poisson))
 SHEAR = LIMESTONE.young / (2 * (1 + LIMESTONE.poisson))

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from skfem.helpers import ddot, dot, sym_grad
 
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.elasticity.operators import elastic_operators, node_volumes
 from mechanics.stones.elasticity.recovery import recovery
 from mechanics.stones.elasticity.stress import sampled_stress, stress_error
@@ -20,7 +21,7 @@ from mechanics.stones.meshing.mesh import boundary_facets
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from mechanics.stones.polyhedra import mass_properties
 from tests.mechanics.shapes import LIMESTONE
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 EACH = pytest.mark.parametrize("element", list(Element))
 SKFEM = {

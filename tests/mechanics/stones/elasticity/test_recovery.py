@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.elasticity.recovery import recovery
 from mechanics.stones.elasticity.stress import SAMPLE_ORDER
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from mechanics.stones.meshing.shape_functions import integration
 from tests.mechanics.shapes import LIMESTONE, TURN, hexahedra
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 EACH = pytest.mark.parametrize("element", list(Element))
 

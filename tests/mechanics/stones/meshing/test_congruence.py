@@ -10,11 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.congruence import motion, translation
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.polyhedra import face_plane
 from tests.mechanics.shapes import LIMESTONE, TURN, brick, moved, scene
-from tests.mechanics.stones.meshing.wild_stones import BOX_FACES, wild_hexahedron, wild_polyhedron
+from tests.mechanics.stones.meshing.wild_stones import wild_hexahedron, wild_polyhedron
 from tests.pipelines.results_by_hand import box
 
 SOFT = Fidelity.DEFORMABLE

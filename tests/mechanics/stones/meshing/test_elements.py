@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from ground.errors import MeshError, SceneError
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import boundary_facets, solid_mesh, with_middle_nodes
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
@@ -17,7 +18,7 @@ from mechanics.stones.meshing.meshers.mesher import mesh_block
 from mechanics.stones.meshing.shape_functions import integration, jacobians, reference_points, tabulated
 from mechanics.stones.polyhedra import face_plane, mass_properties
 from tests.mechanics.shapes import LIMESTONE, TETRAHEDRON_FACES, TURN, hexahedra, prism, profile
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 EACH = pytest.mark.parametrize("element", list(Element))
 HEXAHEDRA = pytest.mark.parametrize("element", [Element.HEX8, Element.HEX20, Element.HEX27])

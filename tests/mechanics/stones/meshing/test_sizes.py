@@ -6,6 +6,7 @@ import pytest
 from mechanics.model.model import build_model
 from mechanics.model.stone_meshes import touching_faces
 from mechanics.scene.scene import Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import tet_mesh
 from mechanics.stones.meshing.meshers._kernels.sampling import Polyhedron, Sizes, lay_points, size_at
@@ -18,7 +19,7 @@ from mechanics.stones.meshing.quality import cell_quality, mesh_quality
 from mechanics.stones.meshing.sizes import as_field, graded
 from mechanics.stones.polyhedra import face_plane
 from tests.mechanics.shapes import TURN, brick, ground, moved, scene, transformed
-from tests.mechanics.stones.meshing.wild_stones import BOX_FACES, wild_hexahedron
+from tests.mechanics.stones.meshing.wild_stones import wild_hexahedron
 from tests.pipelines.results_by_hand import box
 
 SOFT = Fidelity.DEFORMABLE

@@ -8,13 +8,14 @@ import pytest
 from ground.errors import MeshError
 from mechanics.model.model import build_model
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.meshers import mesher as mesher_module
 from mechanics.stones.meshing.meshers.choice import Mesher
 from mechanics.stones.meshing.meshers.mesher import meshed_block
 from mechanics.stones.meshing.soundness import check_meshable, is_convex
 from tests.mechanics.shapes import LIMESTONE, brick, profile, scene
-from tests.mechanics.stones.meshing.wild_stones import BOX_FACES, wild_hexahedron
+from tests.mechanics.stones.meshing.wild_stones import wild_hexahedron
 from tests.pipelines.results_by_hand import box
 
 SOFT = Fidelity.DEFORMABLE

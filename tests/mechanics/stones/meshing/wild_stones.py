@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 # the planes of a cube's corners: which of the low and high sides of x, y, z meet there
 _SIDES = ((0, 1), (2, 3), (4, 5))
@@ -83,6 +83,3 @@ def wild_polyhedron(rng, faces=None):
 def hull_volume(corners):
     """By qhull [m³]."""
     return float(ConvexHull(corners - corners.mean(axis=0)).volume)
-
-
-__all__ = ["BOX_FACES", "cut_out", "hull_volume", "wild_hexahedron", "wild_polyhedron"]

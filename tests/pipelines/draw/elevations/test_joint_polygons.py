@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
+from mechanics.scene.shapes import BOX_FACES
 from pipelines.draw.elevations.closing_shapes import joint_polygon
 from survey.geometry.solids import Solid, area_vector
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -6,8 +6,6 @@ from contextlib import contextmanager
 
 import pytest
 
-__all__ = ["Browsing", "browsing"]
-
 
 class Browsing:
     """One page at a time, with what it asked of the network and said on its console."""

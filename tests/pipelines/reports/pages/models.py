@@ -6,8 +6,6 @@ from mechanics.scene.shapes import BOX_FACES, box_corners
 from pipelines.reports.page.model import Column, Model, Motion
 from pipelines.reports.page.surfaces import stones_of
 
-__all__ = ["wall_model"]
-
 
 def wall_model(count, instants=2, seed=1, code="S{}"):
     """A wall of bricks that move at random, a little more in every instant."""

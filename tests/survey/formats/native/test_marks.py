@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from survey.formats.native.reader import open_moma, read_moma, write_moma
+from survey.formats.native.reader import open_moma, read_moma
+from survey.formats.native.writer import write_moma
 from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.result import orientation_values, write_orientation
 from survey.orientation.projection import project

@@ -9,7 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ground.errors import SurveyError, UsageError
-from survey.formats.native.reader import open_moma, read_head, read_moma, with_header, write_moma
+from survey.formats.native.reader import open_moma, read_head, read_moma, with_header
+from survey.formats.native.writer import write_moma
 from survey.formats.options import ReadingOptions
 from survey.records.survey import (
     OBSERVER,

@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-__all__ = ["Polyhedron", "Sizes", "lay_points", "size_at"]
-
 _APART = 0.65  # distance from all other points, over the size
 _INSIDE = 0.4  # distance from the boundary of the face or stone that a point fills, over the size
 _STEP = 0.97  # of the cubic lattice, over the size: tetrahedra then have edges of about that length

@@ -5,8 +5,6 @@ from math import sqrt
 import numpy as np
 from numba import njit
 
-__all__ = ["improve", "relax", "shape"]
-
 _REACH = 0.4  # first trial step of a node over its shortest edge; each further step over the one before
 _STEPS = 4  # trial steps of a node
 _FIXED = 1e-12  # largest diagonal entry of the projector of a node that is fixed

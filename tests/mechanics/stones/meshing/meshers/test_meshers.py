@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from ground.errors import MeshError, MissingLibraryError
 from mechanics.scene.scene import Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import boundary_facets, tet_mesh
 from mechanics.stones.meshing.meshers.choice import Mesher
@@ -18,7 +19,7 @@ from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.mesher import meshed_block
 from mechanics.stones.polyhedra import face_plane, mass_properties
 from tests.mechanics.shapes import TETRAHEDRON_FACES, TURN, brick, hexahedra
-from tests.pipelines.results_by_hand import BOX_FACES, box
+from tests.pipelines.results_by_hand import box
 
 MESHERS = pytest.mark.parametrize("mesher", [mesh_with_gmsh, mesh_with_delaunay])
 STONE = box((0, 0, 0), (0.6, 0.4, 0.3)) @ TURN.T + 5.0

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from ground.errors import MeshError
 from mechanics.scene.scene import Block, Fidelity
+from mechanics.scene.shapes import BOX_FACES
 from mechanics.stones.meshing.elements import Element
 from mechanics.stones.meshing.mesh import with_middle_nodes
 from mechanics.stones.meshing.meshers.corner_hexahedra import mesh_at_corners
@@ -20,12 +21,7 @@ from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
 from mechanics.stones.meshing.meshers.mesher import mesh_block
 from tests.mechanics.shapes import LIMESTONE, profile
-from tests.mechanics.stones.meshing.wild_stones import (
-    BOX_FACES,
-    hull_volume,
-    wild_hexahedron,
-    wild_polyhedron,
-)
+from tests.mechanics.stones.meshing.wild_stones import hull_volume, wild_hexahedron, wild_polyhedron
 from tests.paths import ROOT
 
 MESHERS = {"gmsh": mesh_with_gmsh, "delaunay": mesh_with_delaunay, "grid": mesh_with_hexahedra}
