@@ -31,7 +31,7 @@ from benchmarks.report import (
     write_between,
 )
 from pipelines.assess.pushover.findings import mechanism_of
-from pipelines.assess.pushover.measured import read_curve
+from pipelines.assess.pushover.push import read_curve
 from pipelines.draw.loading import draw_curve, draw_pushed
 
 _DATA = ROOT.parent / "shared" / "data" / "experiments"

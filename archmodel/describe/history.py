@@ -289,3 +289,8 @@ def _structure(session: Session, structure: Structure) -> Values:
         "side": structure.side,
     }
     return {name: value for name, value in values.items() if value is not None}
+
+
+def list_entries(session: Session) -> list[dict[str, object]]:
+    """Return number, action, author, source and time of every act of recording, oldest first."""
+    return [entry_values(entry) for entry in session.scalars(select(Entry).order_by(Entry.id))]

@@ -4,5 +4,6 @@ Public: `RigidAssembly`, `Strength`, `assembly` (assembly); `Acceleration`, `Liv
 (live_loads); `Flow`, `LimitLoad`, `Mechanism`, `limit_load`, `lines_of_sliding`, `slides_along_one_line`,
 `without_friction_across` (limit_load); `HeldLimit`, `held_limit` (held); `Thrust`, `thrust` (thrust);
 `GeometricSafety`, `geometric_safety` (thickness); `Kinematics`, `kinematics` (kinematic); `Confirmation`, `confirm`
-(confirm); `Pushover`, `pushover` (pushover); `Joints`, `resultants` (joints).
+(confirm); `Pushover`, `pushover` (pushover); `Joints`, `resultants` (joints); `JawPath`,
+`LoadingTest`, `loading_test` (loading_test).
 """

@@ -175,8 +175,8 @@ def diagnose(
     common: Common,
 ) -> None:
     """Find which of several causes explains the measured deformation, by how much of each, and when it acted."""
-    from moma.cli.text.diagnoses import diagnosis_lines
     from moma.cli.text.formats import as_json
+    from moma.cli.text.studies import diagnosis_lines
     from pipelines.assess.diagnosis.diagnose import diagnose as diagnosed
 
     folder = out or Path("out") / f"{file.stem}-diagnose"

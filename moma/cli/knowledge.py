@@ -14,7 +14,7 @@ from moma.cli.options import At, Common, Sheet
 def entries(common: Common) -> None:
     """List the acts of recording: number, time, author and grounds; `--at` takes their numbers."""
     from archmodel.database.session import open_database
-    from archmodel.describe.entries import list_entries
+    from archmodel.describe.history import list_entries
     from moma.cli.text.formats import as_json, as_table
 
     with open_database(common.db, create=False) as database, database.session(read_only=True) as session:
@@ -109,7 +109,7 @@ def matrix(
     from archmodel.database.as_known import as_known, entry_named
     from archmodel.database.session import open_database
     from moma.cli.text.formats import as_json
-    from moma.cli.text.matrix import matrix_lines
+    from moma.cli.text.knowledge import matrix_lines
     from pipelines.draw.stratigraphy.matrix import draw, study
 
     with open_database(common.db, create=False) as database, database.session(read_only=True) as session:

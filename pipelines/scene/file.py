@@ -7,14 +7,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from archmodel.store.lookalikes import explained, plain_form
 from ground.errors import SceneError
+from ground.settings import Setting
 from mechanics.scene.laws.dry_joint import DryJoint
-from mechanics.scene.scene import ContactSettings, SolverSettings, TimeSettings
+from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
 from pipelines.draw.catalogue import PICTURES
 from pipelines.scene.array_tables import ArrayTable, read_entries
@@ -24,11 +25,75 @@ from pipelines.scene.pushover import Pushing, read_pushover
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
 from pipelines.scene.stages import read_stages
-from pipelines.scene.tables import ARRAYS, AUTO, MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
-from pipelines.toml.keys import build, typed_values
+from pipelines.toml.keys import Stones, Vector, build, keys_of, typed_values
 from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import TomlDocument, check_table, nearest
+from pipelines.toml.schema import Key, TomlDocument, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
+
+ARRAYS = ("meshes", "laws", "loads", "throw", "stages", "assess")
+"""Tables of which a scene may have many."""
+
+AUTO = "auto"
+"""Default model of [bodies]: as the outputs need it."""
+
+_default, *_lists = keys_of(Fidelities)
+_models = (AUTO, Fidelity.RIGID.value, Fidelity.DEFORMABLE.value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Title:
+    """Table [scene]."""
+
+    name: Annotated[str | None, Setting("Title of reports and pictures; if not given, the file's name.")] = (
+        None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Gravity:
+    """Table [gravity]."""
+
+    magnitude: Annotated[float, Setting("Acceleration of gravity.", "m/s²", at_least=0)] = 9.81
+    direction: Annotated[
+        Vector, Setting("Direction in which things fall; its length does not matter.", "-")
+    ] = (0.0, 0.0, -1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MeshedStones:
+    """Stones of a table [[meshes]]."""
+
+    stones: Annotated[Stones, Setting("Codes or expressions of the stones that are meshed otherwise.")]
+
+
+TABLES: Mapping[str, tuple[Key, ...]] = {
+    "scene": keys_of(_Title),
+    "select": keys_of(Selection),
+    "bodies": (replace(_default, default=AUTO, choices=_models), *_lists),
+    "joints": keys_of(JointSettings),
+    "contact": (*keys_of(DryJoint), *keys_of(ContactSettings)),
+    "gravity": keys_of(_Gravity),
+    "mesh": keys_of(MeshSettings),
+    "time": keys_of(TimeSettings),
+    "solver": keys_of(SolverSettings),
+    "output": keys_of(Output),
+}
+
+SITE_KEYS = keys_of(Site)
+
+MATERIAL_KEYS = (*keys_of(Material), *keys_of(MaterialRule))
+
+ORTHOTROPY_KEYS = keys_of(Orthotropy)
+
+MESH_KEYS = (
+    *keys_of(_MeshedStones),
+    *(
+        replace(key, doc=f"As in `[mesh]`, whose `{key.name}` holds if none is given.", default=None)
+        for key in keys_of(MeshSettings)
+        if key.name != "ring_size"
+    ),
+)
+
 
 BESIDE = ("diagnosis", "hypotheses")
 """Tables that may stand in a scene file and are read by `moma diagnose` alone."""

@@ -4,6 +4,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.stats import norm, qmc
 
 from ground.errors import SceneError
 from mechanics.arrays import Array
@@ -19,7 +20,6 @@ from pipelines.assess.study.methods.design_points import Design, design_points
 from pipelines.assess.study.methods.failure import Failure
 from pipelines.assess.study.methods.first_order import FirstOrder, first_order, regressed
 from pipelines.assess.study.methods.importance import importance
-from pipelines.assess.study.methods.plans import latin_hypercube, monte_carlo
 from pipelines.assess.study.methods.sobol import Indices, sobol
 from pipelines.assess.study.methods.subset import Subset, subset
 from pipelines.assess.study.problem import Problem
@@ -27,6 +27,28 @@ from pipelines.assess.study.quantities import quantity_name
 from pipelines.assess.study.sampling import IncompleteError, Sampler
 from pipelines.assess.study.settings import Method, StudyTable
 from pipelines.assess.workers.store import Sample
+
+
+def monte_carlo(count: int, dimension: int, seed: int, stage: int = 0) -> Array:
+    """Return independent points (count, dimension); each follows from the seed, the stage and its number alone.
+
+    >>> bool((monte_carlo(5, 2, 1)[:3] == monte_carlo(3, 2, 1)).all())
+    True
+    """
+    points = np.empty((count, dimension))
+    for number in range(count):
+        points[number] = np.random.default_rng([seed, stage, number]).standard_normal(dimension)
+    return points
+
+
+def latin_hypercube(count: int, dimension: int, seed: int) -> Array:
+    """Return points (count, dimension) of which each unknown has one in each of `count` equally probable intervals."""
+    if dimension == 0:
+        return np.zeros((count, 0))
+    plan = qmc.LatinHypercube(dimension, rng=np.random.default_rng([seed, 1]))
+    points: Array = norm.ppf(plan.random(count))
+    return points
+
 
 _CURVE = 21  # levels of a fragility curve that are not given
 

@@ -1,4 +1,4 @@
 """The stratigraphy of a database: its order with dates and contradictions, and the matrix drawn.
 
-Public: `Matrix`, `draw`, `study` (matrix); `matrix_svg` (drawing); `matrix_page` (page).
+Public: `Matrix`, `draw`, `study`, `matrix_page` (matrix); `matrix_svg` (drawing).
 """

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from ground.errors import SceneError, SolverError
-from mechanics.limit.loading_test import _loaded, loading_test, softening_step
+from mechanics.limit.loading_test import JawPath, _loaded, loading_test, softening_step
 from mechanics.model.model import build_model
-from mechanics.scene.jaws import JawPath
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint

@@ -19,7 +19,7 @@ from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_ar
 from mechanics.problem.forms import SparseForm
 from mechanics.problem.problem import ContactSolution, ContactStart
 from mechanics.problem.residual import residual
-from mechanics.solvers.first_order.anderson import Anderson
+from mechanics.solvers.first_order.nsgs import Anderson
 from mechanics.solvers.second_order.newton import Newton
 
 # gap and infeasibility asked of Clarabel, which it can just reach; η is about the root of it [-]

@@ -6,9 +6,8 @@ import pytest
 from mechanics.problem.residual import project_on_cone, residual
 from mechanics.solvers import from_nothing
 from mechanics.solvers.auto import Auto
-from mechanics.solvers.chain import follow
+from mechanics.solvers.chain import follow, without_self_stress
 from mechanics.solvers.from_nothing import rests_from_nothing
-from mechanics.solvers.self_stress import without_self_stress
 from tests.mechanics.solvers.problems import SIDE, STEP, G, carried, cold, column
 
 WEIGHT = 0.25 * SIDE**2 * G  # of a block, per density [N m³/kg]

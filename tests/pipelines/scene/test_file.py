@@ -11,9 +11,8 @@ from ground.errors import MomaError, SceneError
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, SolverSettings, Start, TimeSettings
 from mechanics.stones.meshing.elements import Element
-from pipelines.scene.file import parse_scene, read_scene
+from pipelines.scene.file import TABLES, parse_scene, read_scene
 from pipelines.scene.settings import Fidelities, MeshSettings, Output, Selection
-from pipelines.scene.tables import TABLES
 from survey.joints.settings import JointSettings
 from tests.paths import ROOT
 from tests.pipelines.scenes import fails_at_line

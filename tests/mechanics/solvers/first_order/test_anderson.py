@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from mechanics.solvers.first_order.anderson import Anderson
-from mechanics.solvers.first_order.nsgs import NSGS
+from mechanics.solvers.first_order.nsgs import NSGS, Anderson
 from tests.mechanics.solvers.problems import cold, column
 
 

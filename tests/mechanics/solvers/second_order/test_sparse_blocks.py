@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.solvers.second_order.sparse_blocks import SparseBlocks
+from mechanics.solvers.second_order.newton_equations import SparseBlocks
 
 
 def matrix(seed, count=12):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipelines.assess.study.methods.plans import monte_carlo
+from pipelines.assess.study.estimates import monte_carlo
 from pipelines.assess.study.study import run_study
 from tests.pipelines.assess.study.surveys import DEPTH, HEIGHT, SCENE, block_survey, study_file
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
+from pipelines.assess.study.estimates import latin_hypercube, monte_carlo
 from pipelines.assess.study.inputs.distributions import Distribution
 from pipelines.assess.study.methods.counting import controlled, mean_of, probability
 from pipelines.assess.study.methods.design_points import design_point, design_points
 from pipelines.assess.study.methods.failure import Failure
 from pipelines.assess.study.methods.first_order import first_order
 from pipelines.assess.study.methods.importance import importance
-from pipelines.assess.study.methods.plans import latin_hypercube, monte_carlo
 from pipelines.assess.study.methods.sobol import sobol
 from pipelines.assess.study.methods.subset import subset
 from pipelines.assess.study.settings import Shape
