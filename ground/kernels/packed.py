@@ -48,14 +48,9 @@ def _misfit(fitting: dict[str, Any]) -> str | None:
     lacking = sorted(needed - _features())
     if lacking:
         return f"the kernels of this wheel need a processor with {', '.join(lacking)}"
-    if not _is_writable(_FITTING.parent):
+    if not os.access(_FITTING.parent, os.W_OK):
         return f"numba reads no kernels of a folder that is read-only, {_FITTING.parent}"
     return None
-
-
-def _is_writable(folder: Path) -> bool:
-    """Return whether files can be made in a folder: numba looks for kernels only where it could keep them."""
-    return os.access(folder, os.W_OK)
 
 
 def _features() -> set[str]:

@@ -355,8 +355,4 @@ def _largest(joint: Ints, values: Array, count: int) -> Array:
 
 def _ratio(number: Array, by: Array) -> Array:
     """Return the ratio; NaN where the denominator is not positive."""
-    return np.where(by > 0, number / _positive(by), np.nan)
-
-
-def _positive(values: Array) -> Array:
-    return np.where(values > 0, values, 1.0)
+    return np.where(by > 0, number / np.where(by > 0, by, 1.0), np.nan)

@@ -16,7 +16,6 @@ from archmodel.store.run_record import without_rounding
 from ground.errors import MissingLibraryError, missing_library
 from mechanics.arrays import Array
 from mechanics.dynamics.outcome import Outcome
-from mechanics.results.contact_result import JointResult
 from mechanics.results.result import BodyResult, Result
 from mechanics.results.stress_values import volume_quantile
 from mechanics.scene.scene import Fidelity
@@ -133,7 +132,7 @@ def _top(result: Result, name: str) -> float | None:
         joints, rows = result.joints, result.joints.bearing
         if not rows.any():
             return None
-        return volume_quantile(joints.pressure_mean[rows], _compression(joints)[rows], 0.99)
+        return volume_quantile(joints.pressure_mean[rows], (joints.pressure_mean * joints.area)[rows], 0.99)
     known = [
         (_fields_of(body, block.material, name), body.node_volume)
         for body, block in zip(result.bodies, result.scene.blocks, strict=True)
@@ -198,11 +197,6 @@ def _largest_pressure(result: Result) -> tuple[float, str] | None:
     slivers = int((joints.pressed & joints.sliver).sum())
     out = f"; without slivers ({slivers})" if slivers else ""
     return float(joints.pressure_mean[number]), f"between {first} and {second}{out}"
-
-
-def _compression(joints: JointResult) -> Array:
-    """Return the normal forces of the joints (nj,) [N]."""
-    return joints.pressure_mean * joints.area
 
 
 def _fields_of(body: BodyResult, material: Material, name: str) -> Array:

@@ -242,7 +242,7 @@ def _report(
 def _proposal(record: StoneRecord, notes: tuple[str, ...]) -> Proposal:
     return Proposal(
         **{name: getattr(record, name) for name in _SIZE},
-        volume=_record_volume(record),
+        volume=volume_of(Solid(record.code, record.solid_vertices, record.solid_faces)),
         outline=tuple((x, y, z) for x, y, z in record.outline.tolist()),
         evidence=record.provenance_text,
         depth_source=record.depth_source,
@@ -259,11 +259,6 @@ def core_record(proposal: InfillProposal) -> StoneRecord:
     face = replace(block.face, provenance=Provenance("hypothesis", proposal.evidence))
     depth = replace(block.depth, source=f"hypothesis: {proposal.evidence}")
     return stone_record(replace(block, face=face, depth=depth))
-
-
-def _record_volume(record: StoneRecord) -> float:
-    """Compute the volume of a recorded stone [m³]."""
-    return volume_of(Solid(record.code, record.solid_vertices, record.solid_faces))
 
 
 def _is_known(proposal: InfillProposal, known_records: Sequence[StoneRecord]) -> bool:

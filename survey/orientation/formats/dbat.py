@@ -346,7 +346,7 @@ def write_dbat(network: Network, folder: Path) -> Path:
                 str(network.photo[k] + 1),
                 network.names[network.point[k]],
                 *map(repr, network.image[k].tolist()),
-                repr(_rms(network.sigma[k])),
+                repr(float(np.sqrt((network.sigma[k] ** 2).mean()))),
             ]
         )
         for k in range(len(network.photo))
@@ -432,10 +432,6 @@ def _control_table(rows: list[ControlRow], path: Path) -> str:
         text.append(", ".join([row.number, row.name, *map(repr, values)]))
     _lines(path, text)
     return "id,label,x,y,z,sx,sy,sz"
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt((values**2).mean()))
 
 
 def _lines(path: Path, lines: list[str]) -> None:
