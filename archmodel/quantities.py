@@ -1,16 +1,17 @@
-"""Catalogue of the results of runs: name, unit, meaning and label of each, stated once.
+"""Catalogue of results of runs, assessments and survey reports: name, unit, meaning and label of each, stated once.
 
 Files, pages, tables, queries, columns of the database and the documentation take them from here. The function that
 computes a result of a structure stands under the same name in `pipelines.results.structure_values`.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One result of a run.
+    """One result.
 
     Attributes
     ----------
@@ -19,7 +20,7 @@ class Quantity:
     label : in a heading or a legend
     meaning : in a few words
     of : bearer of the result: stone, joint, contact, peak, run, stage, summary (where names are paths of keys), or a
-        kind of structure; others are arrays of files
+        kind of structure; others are arrays of files, and rows of reports; *row* bears what names the rows of a table
     """
 
     name: str
@@ -27,6 +28,16 @@ class Quantity:
     label: str
     meaning: str
     of: str
+
+    @property
+    def heading(self) -> str:
+        """Label at the head of a column: with a capital, but for symbols and abbreviations.
+
+        >>> [Quantity(label, None, label, "", "").heading for label in ("largest gap", "λx", "rms")]
+        ['Largest gap', 'λx', 'rms']
+        """
+        capital = re.match("[a-z]{4}", self.label) is not None
+        return f"{self.label[0].upper()}{self.label[1:]}" if capital else self.label
 
     @property
     def described(self) -> str:
@@ -243,6 +254,8 @@ QUANTITIES: tuple[Quantity, ...] = (
     *_of(
         "stage",
         """
+        outcome | | of the stage
+        laid | - | stones laid, removed and held in it | Of these
         weight | N | of the stones that are not fixed | Weight
         reaction | N | of all supports, against gravity | Reaction
         displacement | m | largest of a stone since it was laid | Largest displacement
@@ -250,8 +263,388 @@ QUANTITIES: tuple[Quantity, ...] = (
         balance | - | unbalanced force over the stone's weight, worst stone, at the end | Balance
         """,
     ),
+    *_of(
+        "row",
+        """
+        stone | | code of a stone
+        joint | | codes of its two stones
+        wall | | facade, and zone where it has some
+        facade | | name of the facade | Wall
+        zone | | of the facade
+        course | - | number of the course
+        kind | | of a stone
+        cell | | of disks, by its name
+        stage | | of building, by its name
+        stones | - | how many
+        quantity | | what the row is about
+        """,
+    ),
+    *_of(
+        "cell of disks",
+        """
+        step | - | number of the step
+        time | s | at the end of the step
+        x | m | mean place of the disks
+        y | m | mean place of the disks
+        lambda_x | - | max - min of x over that at the start | λx
+        lambda_y | - | max - min of y over that at the start | λy
+        spread_x | - | standard deviation of x over that at the start
+        spread_y | - | standard deviation of y over that at the start
+        volume | - | change of the area by the linear map nearest to the motion
+        shear | - | ln of the ratio of its principal stretches
+        turned | ° | its rotation, counter-clockwise
+        sigma_xx | Pa | mean stress, compression positive | σxx
+        sigma_yy | Pa | mean stress, compression positive | σyy
+        sigma_xy | Pa | mean stress | σxy
+        p | Pa | (σ1 + σ2)/2
+        q | Pa | (σ1 - σ2)/2
+        direction | ° | angle of σ1 from the x axis | σ1 from x
+        anisotropy | - | 2 (φ1 - φ2) of the fabric
+        a | 1/m² | (f1 - f2)/2 of the fabric over the area
+        fabric_direction | ° | angle of φ1 from the x axis | φ1 from x
+        coordination | - | contacts that bear a force per disk
+        porosity | - | share of the area that no disk fills
+        """,
+    ),
+    *_of(
+        "disks",
+        """
+        radius | m | of a disk
+        velocity | m/s | of its centre
+        spin | rad/s | counter-clockwise
+        turn | rad | since the start, counter-clockwise
+        pressure | Pa | mean pressure in the share of a disk; 0 where it has none
+        force | N | mean force of a contact over the step
+        force_normal | N | the same across the contact, positive in compression
+        force_tangential | N | the same along the contact
+        gap | m | negative: overlap
+        """,
+    ),
+    *_of(
+        "run of disks",
+        """
+        overlap.max | - | over the smallest radius | Largest overlap
+        overlap.mean | - | of the contacts that touch, over all steps, over the smallest radius | Mean overlap
+        natural_map.median | - | residual of the natural map, over the steps | Residual η, median
+        natural_map.max | - | the largest of them | Residual η, largest
+        unconverged_share | - | share of the steps above the tolerance | Unsolved steps
+        energy | - | that no term of the balance explains, over the largest in play | Energy
+        """,
+    ),
+    *_of(
+        "load in assessment.json",
+        """
+        name | | the question | Question
+        limit | - | largest load factor under which one step from rest moves nothing, by the rule that judges runs; of \
+        other questions the least | Held or least
+        limit_lost | - | the next that was tried; of other questions the greatest | Lost or greatest
+        bound | - | load factor with associative friction, which no forces in these joints exceed | Bound
+        candidate_lowest | - | load factor that other forces of the same friction hold | Lowest candidate
+        held | - | largest load factor that runs hold, by `--confirm` | Runs hold
+        lost | - | least that they lose | Runs lose
+        tilt | ° | of the ground, that is as much as the load | Tilt
+        """,
+    ),
+    *_of(
+        "value of a code",
+        """
+        symbol | | as in the code
+        value | | with its unit
+        formula | | that gives it
+        article | | of the code
+        """,
+    ),
+    *_of(
+        "check of a code",
+        """
+        name | | of the check | Check
+        capacity | | with its unit
+        demand | | with its unit
+        ratio | - | capacity over demand
+        passed | | the verdict | Verdict
+        formula | | that gives the capacity
+        article | | of the code
+        """,
+    ),
+    *_of(
+        "measure_again",
+        """
+        changes | | verdict that changes with it; nothing where none does | What depends on it
+        reason | | why it is doubtful | Why
+        action | | what to measure | What to do
+        line | - | of the survey file
+        """,
+    ),
+    *_of(
+        "beds",
+        """
+        text | | what moved, where and by how much | Finding
+        dating | | courses that were laid after it | Age
+        probability | - | of as much by chance | By chance
+        excluded | m | would have been found in 95 of 100 surveys, if all courses shared it | Excluded: more than
+        """,
+    ),
+    *_of(
+        "faces",
+        """
+        lean | ° | of the plane of the wall, outwards; in survey.json in radians | Leans out by
+        scatter | m | of the faces about it | Faces scatter by
+        text | | what moved, where and by how much | Finding
+        probability | - | of as much by chance | By chance
+        excluded | m | would have been found in 95 of 100 surveys | Excluded: lean or bulge of more than
+        excluded_stone | m | the same of a single stone | a stone out by more than
+        """,
+    ),
+    *_of(
+        "odd",
+        """
+        text | | how the stone is out of place | Finding
+        score | - | departure over its standard deviation | Significance
+        """,
+    ),
+    *_of(
+        "depths",
+        """
+        against | | evidence that the depth contradicts
+        text | | depth, and what is expected | Finding
+        score | - | difference over its standard deviation | Significance
+        """,
+    ),
+    *_of(
+        "since",
+        """
+        distance | m | from the place in the earlier campaign, with its standard deviation | Displacement
+        score | - | the same over its standard deviation | Significance
+        displacement | m | along the axes | x, y, z
+        outwards | m | along the normal of its face
+        significant | | moved, once in a hundred comparisons by chance | Verdict
+        """,
+    ),
+    *_of(
+        "control",
+        """
+        name | | of the point | Control point
+        residual_x | m | site minus transformed coordinate | Residual in x
+        residual_y | m | the same | y
+        residual_z | m | the same | z
+        standardised | - | length of the residual over its standard deviation | Test
+        limit | - | that a sound point keeps below
+        rejected | | left out as a blunder | Left out
+        """,
+    ),
+    *_of(
+        "evidence",
+        """
+        point | | name of the corner | Corner
+        sigma | m | standard deviations along x, y and z | σ
+        how | | it was located | Located as
+        rays | | photographs, with the places on them in pixels | Marks
+        """,
+    ),
+    *_of(
+        "courses",
+        """
+        level | m | height of the line at its middle | Bed at
+        slope | - | to the right of the viewer, with the probability of as much by chance | Slope (chance)
+        sag | m | of the best parabola at mid-span, with its probability | Mid-span over chord (chance)
+        rms | m | of the corners about the line
+        worst | m | deviation of the farthest corner | Farthest corner
+        scatter | m | of the beds | Beds scatter by
+        height | m | from this bed to the next, in `course_heights` | Height to next bed
+        finding | | what is found, or excluded, of the course
+        """,
+    ),
+    *_of(
+        "grade",
+        """
+        symbol | | of the parameter | Symbol
+        parameter | | of the masonry quality index
+        grade | | F fulfilled, PF partly, NF not
+        text | | why | Evidence
+        """,
+    ),
+    *_of(
+        "index",
+        """
+        direction | | of the loads | Loads
+        index | - | masonry quality index, 0 to 10
+        category | | A good, B average, C inadequate
+        """,
+    ),
+    *_of(
+        "kinds",
+        """
+        length | m | usual length of a face, with the scatter of the stones
+        height | m | usual height of a face, with the scatter of the stones
+        source | | what the usual face is known from | Evidence
+        odd | m | stones that differ by more than three standard deviations | Stones beyond 3 σ
+        """,
+    ),
+    *_of(
+        "contradictions",
+        """
+        kind | | as stated | Called
+        text | | what its proportions say | But
+        significance | - | excess over its standard deviation
+        """,
+    ),
+    *_of(
+        "stones",
+        """
+        rms | m | of the residuals of the points that were not left out
+        sigma0 | - | 1 if the points are as precise as stated | σ₀
+        redundancy | - | accepted points minus 3
+        blunders | | points left out as blunders, and worn corners | Left out
+        shape | | verdict on a plane as its shape | Face
+        tilt_sigma | ° | of the less certain tilt of its plane | Tilt σ
+        length | m | length and height of its face, with the standard deviation | Length × height
+        deviation | m | from the usual face of its kind | Off the usual
+        depth | m | with its standard deviation
+        depth_source | | evidence for the depth | Evidence for the depth
+        """,
+    ),
+    *_of(
+        "photographs",
+        """
+        photograph | | its name
+        omega | ° | turn about x | ω
+        phi | ° | turn about y | φ
+        kappa | ° | turn about z | κ
+        x | m | place of the camera
+        y | m | place of the camera
+        z | m | place of the camera
+        marks | - | on the photograph
+        rms | px | of the residuals of its marks
+        """,
+    ),
+    *_of(
+        "camera",
+        """
+        parameter | | of the camera's model
+        value | | in the unit of the calibration
+        sigma | | in the same unit; held: not adjusted | Standard deviation
+        """,
+    ),
+    *_of(
+        "control of photographs",
+        """
+        id | | of the point | Point
+        use | | fixed, weighted or check
+        residual_x | m | given minus adjusted place | Residual in x
+        residual_y | m | the same | y
+        residual_z | m | the same | z
+        test | - | length of the residual over its standard deviation
+        """,
+    ),
+    *_of(
+        "suspected marks",
+        """
+        photograph | | its name
+        point | | marked on it
+        line | - | of the file
+        residual | px | along x and y
+        test | - | residual over its standard deviation
+        verdict | | suspected, or left out
+        """,
+    ),
+    *_of(
+        "correlations",
+        """
+        of | | camera or photograph
+        a | | one parameter | Parameter
+        b | | the other | and
+        value | - | correlation of the two | Correlation
+        """,
+    ),
+    *_of(
+        "peak in summary.json",
+        """
+        value | | largest during the run | Largest
+        time | s | of that | At
+        stones | | the stone, or the two of the joint | Stone or joint
+        end | | at the end | At the end
+        """,
+    ),
+    *_of(
+        "expected error",
+        """
+        value | - | against a much finer model | Error to expect
+        """,
+    ),
+    *_of(
+        "designs",
+        """
+        number | - | of the design point | Design point
+        index | - | distance from the mean, in standard deviations | β
+        probability | - | of failure, by first order | Φ(-β)
+        unknowns | | those that decide, with their values | Unknowns that decide, with their values there
+        """,
+    ),
+    *_of(
+        "sobol",
+        """
+        input | | unknown, or group of them
+        first | - | first-order index, with its interval | Alone
+        total | - | total index, with its interval | With interactions
+        """,
+    ),
+    *_of(
+        "actions",
+        """
+        text | | what to measure | Measurement
+        share | - | of the variance, to first order | Variance taken away
+        """,
+    ),
+    *_of(
+        "shares",
+        """
+        input | | unknown, or group of them
+        share | - | of the variance
+        """,
+    ),
+    *_of(
+        "band",
+        """
+        parameter | | with a scatter
+        scatter | - | coefficient of variation
+        change | N | by one standard deviation | Change of the largest force by one standard deviation
+        """,
+    ),
+    *_of(
+        "compared wall",
+        """
+        chi2 | - | squared misfit of what is measured and simulated | χ²
+        chi2_still | - | the same, if nothing had moved | χ² if nothing had moved
+        dof | - | degrees of freedom of both | Degrees of freedom
+        """,
+    ),
+    *_of(
+        "compared course",
+        """
+        measured | m | as surveyed | Sag, measured
+        simulated | m | the same of the run | Sag, simulated
+        sigma | m | standard deviation of their difference | σ
+        slope_measured | - | as surveyed | Slope, measured
+        slope_simulated | - | the same of the run | Slope, simulated
+        slope_sigma | - | standard deviation of their difference | σ
+        """,
+    ),
+    *_of(
+        "hypothesis",
+        """
+        name | | what may have moved | Hypothesis
+        chi2 | - | squared misfit | χ²
+        dof | - | degrees of freedom | Degrees of freedom
+        probability | - | of as large a misfit by chance
+        behind | - | corrected Akaike criterion over that of the best | AICc behind the best
+        amplitude | | of the movement, by its name
+        value | | most probable
+        low | | end of its interval | From
+        high | | end of its interval | To
+        """,
+    ),
 )
-"""All results of runs."""
+"""All results."""
 
 
 def quantities_of(*bearers: str) -> Mapping[str, Quantity]:

@@ -27,11 +27,8 @@ _MORE = ("penetration", "energy")
 _STAGES = ("name", "outcome", "stones", "laid", "removed", "held", "weight", "reaction", "bed", "time")
 _CELLS = ("cell", "lambda_x", "lambda_y", "p", "q", "porosity", "coordination")
 _UNITS = {
-    **units_of("stone", "joint", "joint in the database"),
+    **units_of("cell of disks", "stage", "stone", "joint", "joint in the database"),
     **dict.fromkeys(("time", "wall"), "s"),
-    **dict.fromkeys(("p", "q"), "Pa"),
-    **dict.fromkeys(("weight", "reaction"), "N"),
-    "bed": "m",
 }
 _TABLES: dict[str, tuple[str, tuple[str, ...] | None]] = {
     "stages": ("stages of building", _STAGES),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from archmodel.quantities import quantities_of
 from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.trishear import Trishear
 from pipelines.draw.elevations.sheet import new_sheet
@@ -236,21 +237,17 @@ def draw_curves(
     quality : a line about overlaps and residuals
     """
     figure = new_sheet((_WIDE, 7.0))
-    panels = (
-        ("p", "p [kPa]", 1e-3),
-        ("q", "q [kPa]", 1e-3),
-        ("lambda_x", "λx [-]", 1.0),
-        ("lambda_y", "λy [-]", 1.0),
-        ("anisotropy", "anisotropy of the fabric [-]", 1.0),
-        ("porosity", "porosity [-]", 1.0),
-    )
-    for axes, (column, label, unit) in zip(figure.subplots(3, 2, sharex=True).flat, panels, strict=True):
+    quantities = quantities_of("cell of disks")
+    columns = ("p", "q", "lambda_x", "lambda_y", "anisotropy", "porosity")
+    for axes, column in zip(figure.subplots(3, 2, sharex=True).flat, columns, strict=True):
+        label, unit = quantities[column].label, quantities[column].unit
+        size, unit = (1e-3, "kPa") if unit == "Pa" else (1.0, unit)
         for name, values in rows.items():
             style = {"color": "grey", "linestyle": ":"} if name == WHOLE else {}
-            axes.plot(values["time"], unit * values[column], label=name, linewidth=0.9, **style)
+            axes.plot(values["time"], size * values[column], label=name, linewidth=0.9, **style)
         for time in phases:
             axes.axvline(time, color="black", linewidth=0.5, linestyle="--")
-        axes.set_ylabel(label, fontsize=8)
+        axes.set_ylabel(f"{label} [{unit}]", fontsize=8)
         axes.tick_params(labelsize=7)
         axes.grid(alpha=0.3)
     figure.axes[0].legend(frameon=False, fontsize=7, ncols=2)

@@ -8,6 +8,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from archmodel.quantities import quantities_of
 from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.cells import Cell, layer_members, members, shape_of
 from mechanics.planar.measures.fabric import fabric_of
@@ -20,31 +21,8 @@ _EXPERIMENT = "experiment.csv"  # rows of what an experiment observes
 WHOLE = "whole sample"
 """Name of the rows of all disks."""
 
-CELL_COLUMNS: Mapping[str, str] = {
-    "step": "number of the step",
-    "time": "[s]",
-    "x": "mean place of the disks [m]",
-    "y": "mean place of the disks [m]",
-    "lambda_x": "max - min of x over that at the start [-]",
-    "lambda_y": "max - min of y over that at the start [-]",
-    "spread_x": "standard deviation of x over that at the start [-]",
-    "spread_y": "standard deviation of y over that at the start [-]",
-    "volume": "change of the area by the linear map nearest to the motion [-]",
-    "shear": "ln of the ratio of its principal stretches [-]",
-    "turned": "its rotation, counter-clockwise [°]",
-    "sigma_xx": "mean stress, compression positive [Pa]",
-    "sigma_yy": "mean stress, compression positive [Pa]",
-    "sigma_xy": "mean stress [Pa]",
-    "p": "(σ1 + σ2)/2 [Pa]",
-    "q": "(σ1 - σ2)/2 [Pa]",
-    "direction": "angle of σ1 from the x axis [°]",
-    "anisotropy": "2 (φ1 - φ2) of the fabric [-]",
-    "a": "(f1 - f2)/2 of the fabric over the area [1/m²]",
-    "fabric_direction": "angle of φ1 from the x axis [°]",
-    "coordination": "contacts that bear a force per disk [-]",
-    "porosity": "share of the area that no disk fills [-]",
-}
-"""Columns of the rows of a cell, and their meaning."""
+CELL_COLUMNS = tuple(quantities_of("cell of disks"))
+"""Columns of the rows of a cell."""
 
 
 @dataclass(frozen=True)

@@ -6,28 +6,14 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from archmodel.quantities import units_of
 from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.cells import Cell, members
 from pipelines.geology.observe import CELL_COLUMNS, Fields
 from pipelines.geology.sample import PreparedSample
 from pipelines.results.vtu import LINE, POLYGON, VERTEX, UnstructuredGrid, cells_of, write_pvd, write_vtu
 
-_UNITS = {
-    "radius": "m",
-    "velocity": "m/s",
-    "spin": "rad/s",
-    "turn": "rad",
-    "pressure": "Pa",
-    "force": "N",
-    "force_normal": "N",
-    "force_tangential": "N",
-    "gap": "m",
-    "a": "1/m²",
-    "time": "s",
-    **dict.fromkeys(("x", "y"), "m"),
-    **dict.fromkeys(("sigma_xx", "sigma_yy", "sigma_xy", "p", "q"), "Pa"),
-    **dict.fromkeys(("turned", "direction", "fabric_direction"), "°"),
-}
+_UNITS = units_of("disks", "cell of disks")
 
 
 def write_series(

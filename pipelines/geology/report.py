@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from archmodel.quantities import quantities_of
 from mechanics.arrays import Array
 from pipelines.geology.file import GeologyScene
-from pipelines.reports.html import kilopascals, percent, picture, ratio, scientific, write_page
+from pipelines.reports.html import kilopascals, percent, picture, ratio, scientific, table_of, write_page
 from pipelines.reports.page.model import Model
 
 _CAPTIONS = {
@@ -22,7 +23,6 @@ _CAPTIONS = {
     "course": "What the experiment observes with time; dashed lines part the phases of the run.",
     "cells": "The cells with time; dashed lines part the phases of the run.",
 }
-_HEAD = ("Cell", "λx", "λy", "p", "q", "σ1 from x", "Anisotropy", "φ1 from x", "Coordination", "Porosity")
 _OUTCOMES = {
     "equilibrium": "At the end all disks rest, in balance.",
     "moving": "At the end of the run disks still move.",
@@ -62,8 +62,7 @@ def write_report(
         versions=summary.get("versions"),
         measures=[(name, ratio(value)) for name, value in summary["measures"].items()],
         quality=_quality(summary),
-        head=_HEAD,
-        cells=[_cell(name, columns) for name, columns in rows.items()],
+        cells=table_of("cell of disks", list(rows.items()), _cell),
         figures=[picture(path, f"{words} Quality: {summary['headline']}.") for path, words in figures],
         settings=_settings(scene),
     )
@@ -73,44 +72,42 @@ def _quality(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     overlap, over_mean, eta = (
         summary[name] for name in ("overlap", "overlap_over_mean_radius", "natural_map")
     )
-    return [
-        (
-            "Largest overlap",
+    values = {
+        "overlap.max": (
             f"{overlap['max']:.2%}",
             f"of the smallest radius; {over_mean['max']:.2%} of the mean one",
         ),
-        (
-            "Mean overlap",
+        "overlap.mean": (
             f"{overlap['mean']:.3%}",
             f"of the smallest radius; {over_mean['mean']:.3%} of the mean one",
         ),
-        ("Residual η, median", scientific(eta["median"]), "of the natural map, over the steps"),
-        ("Residual η, largest", scientific(eta["max"]), f"the tolerance is {summary['tolerance']:g}"),
-        (
-            "Unsolved steps",
+        "natural_map.median": (scientific(eta["median"]), "of the natural map, over the steps"),
+        "natural_map.max": (scientific(eta["max"]), f"the tolerance is {summary['tolerance']:g}"),
+        "unconverged_share": (
             percent(summary["unconverged_share"]),
             f"{summary['unconverged_steps']} of {summary['steps']}",
         ),
-        (
-            "Energy",
+        "energy": (
             scientific(summary["energy"]),
             "that no term of the balance explains, over the largest in play",
         ),
-    ]
+    }
+    quantities = quantities_of("run of disks")
+    return [(quantities[name].label, *texts) for name, texts in values.items()]
 
 
-def _cell(name: str, columns: Mapping[str, Array]) -> tuple[str, ...]:
+def _cell(cell: tuple[str, Mapping[str, Array]]) -> dict[str, str]:
+    name, columns = cell
     last = {column: float(values[-1]) for column, values in columns.items()}
-    return (
-        name,
-        ratio(last["lambda_x"]),
-        ratio(last["lambda_y"]),
-        *(kilopascals(last[stress]) if np.isfinite(last[stress]) else "–" for stress in ("p", "q")),
-        _degrees(last["direction"]),
-        ratio(last["anisotropy"]),
-        _degrees(last["fabric_direction"]),
-        *(ratio(last[column]) for column in ("coordination", "porosity")),
-    )
+    return {
+        "cell": name,
+        **{column: ratio(last[column]) for column in ("lambda_x", "lambda_y")},
+        **{column: kilopascals(last[column]) if np.isfinite(last[column]) else "–" for column in ("p", "q")},
+        "direction": _degrees(last["direction"]),
+        "anisotropy": ratio(last["anisotropy"]),
+        "fabric_direction": _degrees(last["fabric_direction"]),
+        **{column: ratio(last[column]) for column in ("coordination", "porosity")},
+    }
 
 
 def _degrees(angle: float) -> str:

@@ -6,22 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.reports.html import direction_text, input_rows, kilonewtons, percent, picture, write_page
+from pipelines.reports.html import (
+    direction_text,
+    input_rows,
+    kilonewtons,
+    percent,
+    picture,
+    table_of,
+    write_page,
+)
 from pipelines.reports.page.model import Model
 from pipelines.results.wall_axes import WallAxes, axes_of
 
-_HEAD = (
-    "Question",
-    "Held or least",
-    "Lost or greatest",
-    "Bound",
-    "Lowest candidate",
-    "Runs hold",
-    "Runs lose",
-    "Tilt",
-)
-_VALUES = ("Symbol", "Value", "Formula", "Article")
-_CHECKS = ("Check", "Capacity", "Demand", "Ratio", "Verdict", "Formula", "Article")
 _CAPTIONS = {
     "mechanism": "As the stones begin to move, exaggerated.",
     "pushover": "What the stones bear as one of them is led to collapse.",
@@ -54,10 +50,7 @@ def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None
         warnings=(),
         version=summary["versions"]["moma"],
         versions=summary["versions"],
-        head=_HEAD,
-        loads=[_row(load) for load in loads],
-        value_head=_VALUES,
-        check_head=_CHECKS,
+        loads=table_of("load in assessment.json", loads, _load),
         parts=[_part(path.parent, number, load) for number, load in enumerate(loads, start=1)],
     )
 
@@ -138,24 +131,23 @@ def _sure(limit: Mapping[str, Any] | None) -> str:
     )
 
 
-def _row(load: Mapping[str, Any]) -> tuple[str, ...]:
+def _load(load: Mapping[str, Any]) -> dict[str, str]:
+    names = ("name", "limit", "limit_lost", "bound", "candidate_lowest", "held", "lost", "tilt")
+    row = dict.fromkeys(names, "") | {"name": load["name"]}
     if load["kind"] == "thickness":
-        return (load["name"], _number(load["factor"]), *[""] * 6)
+        return row | {"limit": _number(load["factor"])}
     if load["kind"] != "load":
-        ends = (
-            "without limit" if load[end] is None else f"{1e-3 * load[end]:.4g} kN"
-            for end in ("least", "greatest")
-        )
-        return (load["name"], *ends, *[""] * 5)
-    runs = load.get("confirmation", {})
-    tilt = f"{load['tilt']:.3g}°" if "tilt" in load else ""
-    bound = load["outcome"] if load["bound"] is None else _number(load["bound"])
-    held, lost = (_number(runs[end]) if runs.get(end) is not None else "" for end in ("held", "lost"))
-    limit, too_much = (
-        load["outcome"] if load[key] is None else _number(load[key]) for key in ("limit", "limit_lost")
-    )
+        for column, end in (("limit", "least"), ("limit_lost", "greatest")):
+            row[column] = "without limit" if load[end] is None else f"{1e-3 * load[end]:.4g} kN"
+        return row
+    for column in ("limit", "limit_lost", "bound"):
+        row[column] = load["outcome"] if load[column] is None else _number(load[column])
     stood = "" if load["candidate_converged"] in (None, True) else " NOT CONVERGED"
-    return (load["name"], limit, too_much, bound, _number(load["candidate_lowest"]) + stood, held, lost, tilt)
+    row["candidate_lowest"] = _number(load["candidate_lowest"]) + stood
+    runs = load.get("confirmation", {})
+    for column in ("held", "lost"):
+        row[column] = _number(runs[column]) if runs.get(column) is not None else ""
+    return row | ({"tilt": f"{load['tilt']:.3g}°"} if "tilt" in load else {})
 
 
 def _part(folder: Path, number: int, load: Mapping[str, Any]) -> dict[str, Any]:
@@ -166,24 +158,31 @@ def _part(folder: Path, number: int, load: Mapping[str, Any]) -> dict[str, Any]:
         "headline": load["headline"],
         "cautions": [code["caution"]] if code["caution"] else [],
         "code": code["code"],
-        "numbers": [
-            (value["symbol"], f"{value['value']:.4g} {value['unit']}", value["formula"], value["article"])
-            for value in code["values"]
-        ],
-        "checks": [
-            (
-                check["name"],
-                f"{check['capacity']:.4g} {check['unit']}",
-                f"{check['demand']:.4g} {check['unit']}",
-                f"{check['ratio']:.2f}",
-                "passed" if check["passed"] else "NOT PASSED",
-                check["formula"],
-                check["article"],
-            )
-            for check in code["checks"]
-        ],
+        "numbers": table_of("value of a code", code["values"], _value),
+        "checks": table_of("check of a code", code["checks"], _check),
         "mechanism": _mechanism(load["mechanism"]["stones"]),
         "figures": [picture(place, words) for place, words in places if place.exists()],
+    }
+
+
+def _value(value: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "symbol": value["symbol"],
+        "value": f"{value['value']:.4g} {value['unit']}",
+        "formula": value["formula"],
+        "article": value["article"],
+    }
+
+
+def _check(check: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "name": check["name"],
+        "capacity": f"{check['capacity']:.4g} {check['unit']}",
+        "demand": f"{check['demand']:.4g} {check['unit']}",
+        "ratio": f"{check['ratio']:.2f}",
+        "passed": "passed" if check["passed"] else "NOT PASSED",
+        "formula": check["formula"],
+        "article": check["article"],
     }
 
 

@@ -1,14 +1,16 @@
-"""Self-contained HTML pages, and the format of the numbers in them."""
+"""Self-contained HTML pages, their tables, and the format of the numbers in them."""
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from archmodel.quantities import quantities_of
 from archmodel.store.run_record import without_rounding
 from pipelines.reports.page.elevation import elevation
 from pipelines.reports.page.inline import languages_packed, script, style, viewer_html
@@ -17,10 +19,43 @@ from pipelines.reports.page.model import Model
 from pipelines.reports.page.paper import contents, sealed, title_block
 from pipelines.results.wall_axes import WallAxes
 
+T = TypeVar("T")
+
 Picture = dict[str, str]
 """Caption and base64 content of a PNG."""
 
 _LONGEST = 32  # characters of a number with its precision and unit; a longer cell is a sentence
+
+
+@dataclass(frozen=True)
+class Table:
+    """Headings and rows of a table, and how many rows there are with those that the page leaves out."""
+
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    count: int
+
+
+def table_of(
+    bearer: str | tuple[str, ...],
+    items: Sequence[T],
+    cells: Callable[[T], Mapping[str, str]],
+    most: int | None = None,
+) -> Table:
+    """Return a table with a row for each item.
+
+    Parameters
+    ----------
+    bearer : of the quantities of the columns, as in `archmodel.quantities`; beside these there are those of *row*
+    items : what the rows are about
+    cells : gives the texts of a row by the names of their quantities, the same names for all items
+    most : rows that are shown; None: all
+    """
+    known = quantities_of("row", *((bearer,) if isinstance(bearer, str) else bearer))
+    rows = [cells(item) for item in items[:most]]
+    names = tuple(rows[0]) if rows else ()
+    head = tuple(known[name].heading for name in names)
+    return Table(head, [tuple(row[name] for name in names) for row in rows], len(items))
 
 
 def write_page(path: Path, template: str, model: Model | None = None, **values: object) -> None:

@@ -1,11 +1,11 @@
 """report.html of comparisons and diagnoses: measured against simulated deformation, by wall and course."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from archmodel.quantities import quantities_of
-from pipelines.reports.html import in_words, input_rows, millimetres, picture, ratio, write_page
+from pipelines.reports.html import in_words, input_rows, millimetres, picture, ratio, table_of, write_page
 from pipelines.reports.page.model import Model
 
 _RESTS = ("equilibrium", "settled")  # outcomes whose movement is over
@@ -19,29 +19,6 @@ _CAPTIONS = {
     "misfit": "Measured less simulated height of the bed of each stone over its standard deviation: pale stones are "
     "explained, dark blue ones lie lower than simulated, dark red ones higher.",
 }
-_WALLS = ("Wall", "Zone", "Quantity", "χ²", "χ² if nothing had moved", "Degrees of freedom")
-_COURSES = (
-    "Wall",
-    "Zone",
-    "Course",
-    "Sag, measured",
-    "Sag, simulated",
-    "σ",
-    "Slope, measured",
-    "Slope, simulated",
-    "σ",
-)
-_HYPOTHESES = (
-    "Hypothesis",
-    "χ²",
-    "Degrees of freedom",
-    "Probability",
-    "AICc behind the best",
-    "Amplitude",
-    "Value",
-    "From",
-    "To",
-)
 
 
 def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None) -> None:
@@ -67,8 +44,8 @@ def write_comparison(path: Path, summary: Mapping[str, Any], model: Model | None
         versions=summary["versions"],
         figures=_figures(path.parent),
         tables=[
-            ("Walls", _WALLS, [_wall(wall) for wall in summary["walls"]]),
-            ("Courses", (*_COURSES, *_results()), [_course(course) for course in summary["courses"]]),
+            ("Walls", table_of("compared wall", summary["walls"], _wall)),
+            ("Courses", table_of(("compared course", "course"), summary["courses"], _course)),
         ],
         notes=(),
     )
@@ -91,16 +68,8 @@ def write_diagnosis_page(path: Path, name: str, summary: Mapping[str, Any], mode
         versions=summary["versions"],
         figures=_figures(path.parent),
         tables=[
-            (
-                "Hypotheses",
-                _HYPOTHESES,
-                [row for hypothesis in summary["hypotheses"] for row in _hypothesis(hypothesis)],
-            ),
-            (
-                "Walls and courses",
-                (*_WALLS[:3], "Course", *_WALLS[3:]),
-                [_group(group) for group in summary["groups"]],
-            ),
+            ("Hypotheses", table_of("hypothesis", list(_amplitudes(summary["hypotheses"])), _hypothesis)),
+            ("Walls and courses", table_of("compared wall", summary["groups"], _wall)),
         ],
         notes=notes,
     )
@@ -119,61 +88,62 @@ def _figures(folder: Path) -> list[dict[str, str]]:
     ]
 
 
-def _wall(wall: Mapping[str, Any]) -> tuple[str, ...]:
-    return (
-        wall["facade"],
-        wall["zone"] or "–",
-        wall["quantity"],
-        f"{wall['chi2']:.1f}",
-        f"{wall['chi2_still']:.1f}",
-        str(wall["dof"]),
-    )
+def _wall(wall: Mapping[str, Any]) -> dict[str, str]:
+    """Return the misfit of a wall, or of a course of it where there is a key for one."""
+    return {
+        "facade": wall["facade"],
+        "zone": wall["zone"] or "–",
+        "quantity": wall["quantity"],
+        **({"course": _known(wall["course"])} if "course" in wall else {}),
+        "chi2": f"{wall['chi2']:.1f}",
+        "chi2_still": f"{wall['chi2_still']:.1f}",
+        "dof": str(wall["dof"]),
+    }
 
 
-def _group(group: Mapping[str, Any]) -> tuple[str, ...]:
-    wall = _wall(group)
-    return (*wall[:3], "–" if group["course"] is None else str(group["course"]), *wall[3:])
+def _known(number: int | None) -> str:
+    return "–" if number is None else str(number)
 
 
-def _course(course: Mapping[str, Any]) -> tuple[str, ...]:
-    slope = course["slope"]
-    return (
-        course["facade"],
-        course["zone"] or "–",
-        str(course["course"]),
-        *(
-            "–" if course[key] is None else millimetres(course[key])
-            for key in ("measured", "simulated", "sigma")
-        ),
-        *(f"{1e3 * slope[key]:z.3g} mm/m" for key in ("measured", "simulated", "sigma")),
-        *(
-            in_words(course["results"][name], quantity.unit) if name in course["results"] else "–"
+def _course(course: Mapping[str, Any]) -> dict[str, str]:
+    ends = ("measured", "simulated", "sigma")
+    return {
+        "facade": course["facade"],
+        "zone": course["zone"] or "–",
+        "course": str(course["course"]),
+        **{key: "–" if course[key] is None else millimetres(course[key]) for key in ends},
+        **{f"slope_{key}": f"{1e3 * course['slope'][key]:z.3g} mm/m" for key in ends},
+        **{
+            name: in_words(course["results"][name], quantity.unit) if name in course["results"] else "–"
             for name, quantity in quantities_of("course").items()
-        ),
-    )
+        },
+    }
 
 
-def _results() -> list[str]:
-    """Return the headings of the simulated results of courses."""
-    labels = (quantity.label for quantity in quantities_of("course").values())
-    return [f"{label[:1].upper()}{label[1:]}" for label in labels]
+def _amplitudes(
+    hypotheses: Sequence[Mapping[str, Any]],
+) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+    """Yield each amplitude with its hypothesis; of a hypothesis without any, nothing of one."""
+    for hypothesis in hypotheses:
+        for amplitude in hypothesis["amplitudes"] or [{}]:
+            yield hypothesis, amplitude
 
 
-def _hypothesis(hypothesis: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    head = (
-        hypothesis["name"] + (f", stood: {', '.join(hypothesis['stood'])}" if hypothesis["stood"] else ""),
-        ratio(hypothesis["chi2"]),
-        str(hypothesis["dof"]),
-        ratio(hypothesis["probability"]),
-        ratio(hypothesis["behind"]),
-    )
-    return [
-        (
-            *head,
-            amplitude["name"],
-            f"{amplitude['value']:.4g} {amplitude['unit']}",
-            ratio(amplitude["low"]),
-            ratio(amplitude["high"]),
-        )
-        for amplitude in hypothesis["amplitudes"]
-    ] or [(*head, "–", "–", "–", "–")]
+def _hypothesis(row: tuple[Mapping[str, Any], Mapping[str, Any]]) -> dict[str, str]:
+    hypothesis, amplitude = row
+    stood = f", stood: {', '.join(hypothesis['stood'])}" if hypothesis["stood"] else ""
+    cells = {
+        "name": hypothesis["name"] + stood,
+        "chi2": ratio(hypothesis["chi2"]),
+        "dof": str(hypothesis["dof"]),
+        "probability": ratio(hypothesis["probability"]),
+        "behind": ratio(hypothesis["behind"]),
+    }
+    if not amplitude:
+        return cells | dict.fromkeys(("amplitude", "value", "low", "high"), "–")
+    return cells | {
+        "amplitude": amplitude["name"],
+        "value": f"{amplitude['value']:.4g} {amplitude['unit']}",
+        "low": ratio(amplitude["low"]),
+        "high": ratio(amplitude["high"]),
+    }

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from archmodel.quantities import quantities_of
-from pipelines.reports.html import in_words
+from pipelines.reports.html import Table, in_words, table_of
 
 _PASSED = 1.05  # peak over the value at the end, from which the end says too little [-]
 _NO_FORCE = 1e-3  # of the weight [-]: a smaller reaction is not worth a line
@@ -26,11 +26,16 @@ def peak_text(peak: Mapping[str, Any], least: float) -> str:
     return f"{value} after {when}{f', {where}' if where else ''}; {end} at the end"
 
 
-def peak_rows(summary: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Return the rows of the table of all peaks."""
-    least = summary["tolerance"]["length"]
-    labels = quantities_of("peak")
-    return [(labels[name].label, *_cells(one, least)) for name, one in _distinct(summary).items()]
+def peak_table(summary: Mapping[str, Any]) -> Table:
+    """Return the table of all peaks."""
+    least, labels = summary["tolerance"]["length"], quantities_of("peak")
+
+    def cells(peak: tuple[str, Mapping[str, Any]]) -> dict[str, str]:
+        """Return the texts of a peak."""
+        names = ("quantity", "value", "time", "stones", "end")
+        return dict(zip(names, (labels[peak[0]].label, *_cells(peak[1], least)), strict=True))
+
+    return table_of("peak in summary.json", list(_distinct(summary).items()), cells)
 
 
 def _distinct(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

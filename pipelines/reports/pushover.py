@@ -1,10 +1,11 @@
 """report.html of a loading test: what the stones bear, the curve, how sure it is, and how they moved."""
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import direction_text, input_rows, kilonewtons, picture, write_page
+from pipelines.reports.html import direction_text, input_rows, kilonewtons, picture, table_of, write_page
 from pipelines.results.wall_axes import axes_of
 
 _PICTURES = {
@@ -22,6 +23,7 @@ def write_pushover(path: Path, summary: Mapping[str, Any]) -> None:
     path : report.html
     summary : as in pushover.json
     """
+    changes = {} if summary["band"] is None else summary["band"]["by_one_sigma"]
     write_page(
         path,
         "pushover.html",
@@ -35,7 +37,7 @@ def write_pushover(path: Path, summary: Mapping[str, Any]) -> None:
         versions=summary["versions"],
         governs=list(_governs(summary)),
         values=list(_values(summary)),
-        band=list(_band(summary)),
+        band=table_of("band", list(changes.items()), partial(_parameter, summary["band"])),
         level=None if summary["band"] is None else f"{100 * summary['band']['level']:g} %",
         figures=[picture(path.parent / name, words) for name, words in _PICTURES.items()],
     )
@@ -87,7 +89,11 @@ def _values(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Energy that no term explains", f"{errors['energy']:.1e}"
 
 
-def _band(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    if summary["band"] is not None:
-        for name, change in summary["band"]["by_one_sigma"].items():
-            yield name, f"{100 * summary['band']['scatter'][name]:.3g} %", f"{1e-3 * change:+.3g} kN"
+def _parameter(band: Mapping[str, Any], change: tuple[str, float]) -> dict[str, str]:
+    """Return what one standard deviation of a parameter changes."""
+    name, force = change
+    return {
+        "parameter": name,
+        "scatter": f"{100 * band['scatter'][name]:.3g} %",
+        "change": f"{1e-3 * force:+.3g} kN",
+    }

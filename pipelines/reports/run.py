@@ -14,6 +14,7 @@ from mechanics.arrays import Array
 from mechanics.results.result import Result
 from pipelines.draw.plots import history_svg
 from pipelines.reports.html import (
+    Table,
     in_words,
     input_rows,
     kilonewtons,
@@ -24,10 +25,11 @@ from pipelines.reports.html import (
     picture,
     ratio,
     scientific,
+    table_of,
     write_page,
 )
 from pipelines.reports.page.model import Model
-from pipelines.reports.peaks import peak_rows
+from pipelines.reports.peaks import peak_table
 
 _OUTCOMES = {
     "equilibrium": "It stands as surveyed: every stone is at rest, in balance.",
@@ -87,8 +89,7 @@ class _Section:
     """Table under a heading; left out of the page where it has no rows."""
 
     title: str
-    head: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
+    table: Table
     note: str = ""
 
 
@@ -126,7 +127,7 @@ def write_report(
         pictures=[picture(one, _CAPTIONS[one.name]) for one in pictures if one.is_file()],
         summary=_summary_rows(summary, stones),
         notes=_notes(summary),
-        peaks=peak_rows(summary),
+        peaks=peak_table(summary),
         inputs=input_rows(summary),
         errors=[
             (one.label, _error(one.name, result, summary), one.meaning)
@@ -247,86 +248,89 @@ def _profile(profile: Mapping[str, Any] | None) -> dict[str, Any] | None:
         "name": profile["name"],
         "about": profile["about"],
         "settings": ", ".join(f"{name} {value}" for name, value in profile["settings"].items()),
-        "expected": [
-            (one["of"].capitalize(), f"{'up to ' if one['bound'] else ''}{percent(one['value'])}")
-            for one in profile["expected"].values()
-        ],
+        "expected": table_of(
+            "expected error",
+            list(profile["expected"].values()),
+            lambda error: {
+                "quantity": error["of"].capitalize(),
+                "value": f"{'up to ' if error['bound'] else ''}{percent(error['value'])}",
+            },
+        ),
     }
 
 
 def _stages(summary: Mapping[str, Any]) -> _Section:
     """List the stages of building."""
-    rows = [
-        (
-            stage["name"],
-            stage["outcome"],
-            str(stage["stones"]),
-            ", ".join(f"{stage[name]} {name}" for name in ("laid", "removed", "held") if stage[name]),
-            kilonewtons(stage["weight"]),
-            kilonewtons(stage["reaction"]),
-            f"{millimetres(stage['displacement']['max'])} ({stage['displacement']['stone'] or 'none moves'})",
-            f"{1e3 * stage['bed']:+.1f} mm" if stage["bed"] else "",
-            scientific(stage["errors"]["balance"]),
-        )
-        for stage in summary["stages"]
-    ]
-    names = "weight", "reaction", "displacement", "bed", "balance"
-    head = "Stage", "Outcome", "Stones", "Of these", *_headings("stage", *names)
-    return _Section("Stages of building", head, rows, _STAGES)
+    return _Section("Stages of building", table_of("stage", summary["stages"], _stage), _STAGES)
+
+
+def _stage(stage: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "stage": stage["name"],
+        "outcome": stage["outcome"],
+        "stones": str(stage["stones"]),
+        "laid": ", ".join(f"{stage[name]} {name}" for name in ("laid", "removed", "held") if stage[name]),
+        "weight": kilonewtons(stage["weight"]),
+        "reaction": kilonewtons(stage["reaction"]),
+        "displacement": f"{millimetres(stage['displacement']['max'])} "
+        f"({stage['displacement']['stone'] or 'none moves'})",
+        "bed": f"{1e3 * stage['bed']:+.1f} mm" if stage["bed"] else "",
+        "balance": scientific(stage["errors"]["balance"]),
+    }
 
 
 def _stressed(stones: Sequence[StoneResult], least: float) -> _Section:
     """List the stones with the largest stress that 1 % of their volume exceeds."""
-    rows = [
-        (
-            stone.code,
-            megapascals(stone.von_mises_p99),
-            megapascals(stone.von_mises_mean),
-            megapascals(stone.von_mises_max),
-            percent(stone.values["stress_error"]) if "stress_error" in stone.values else "–",
-            millimetres(stone.displacement_max, least),
-        )
-        for stone in _worst(stones, lambda stone: stone.von_mises_p99)
-    ]
-    names = "von_mises_p99", "von_mises_mean", "von_mises_max", "stress_error", "displacement_max"
-    head = "Stone", *_headings("stone", *names)
-    return _Section("Most stressed stones", head, rows, _CORNERS)
+
+    def cells(stone: StoneResult) -> dict[str, str]:
+        """Return the texts of a stone."""
+        error = stone.values.get("stress_error")
+        return {
+            "stone": stone.code,
+            "von_mises_p99": megapascals(stone.von_mises_p99),
+            "von_mises_mean": megapascals(stone.von_mises_mean),
+            "von_mises_max": megapascals(stone.von_mises_max),
+            "stress_error": "–" if error is None else percent(error),
+            "displacement_max": millimetres(stone.displacement_max, least),
+        }
+
+    worst = _worst(stones, lambda stone: stone.von_mises_p99)
+    return _Section("Most stressed stones", table_of("stone", worst, cells), _CORNERS)
 
 
 def _pulled(stones: Sequence[StoneResult]) -> _Section:
     """List the stones nearest to their strength or, where no strength is known, with the largest tension."""
+
+    def cells(stone: StoneResult) -> dict[str, str]:
+        """Return the texts of a stone."""
+        return {
+            "stone": stone.code,
+            "utilisation": ratio(stone.values.get("utilisation")),
+            "principal_tension": megapascals(stone.values["principal_tension"]),
+            "tension_zone": percent(stone.values["tension_zone"]),
+            "principal_compression": megapascals(stone.values["principal_compression"]),
+            "mean_pressure": megapascals(stone.values["mean_pressure"]),
+        }
+
     used = _worst(stones, lambda stone: stone.values.get("utilisation"))
-    rows = [
-        (
-            stone.code,
-            ratio(stone.values.get("utilisation")),
-            megapascals(stone.values["principal_tension"]),
-            percent(stone.values["tension_zone"]),
-            megapascals(stone.values["principal_compression"]),
-            megapascals(stone.values["mean_pressure"]),
-        )
-        for stone in used or _worst(stones, lambda stone: stone.values.get("principal_tension"))
-    ]
-    names = "utilisation", "principal_tension", "tension_zone", "principal_compression", "mean_pressure"
-    head = "Stone", *_headings("stone", *names)
+    worst = used or _worst(stones, lambda stone: stone.values.get("principal_tension"))
     title = "Stones nearest to their strength" if used else "Stones with the largest tension"
-    return _Section(title, head, rows)
+    return _Section(title, table_of("stone", worst, cells))
 
 
 def _uncertain(stones: Sequence[StoneResult]) -> _Section:
     """List the stones whose stress is least certain."""
-    rows = [
-        (stone.code, percent(stone.values["stress_error"]), megapascals(stone.von_mises_p99))
-        for stone in _worst(stones, lambda stone: stone.values.get("stress_error"))
-    ]
-    head = "Stone", *_headings("stone", "stress_error", "von_mises_p99")
-    return _Section("Stones with the least certain stress", head, rows, _STRESS_ERROR)
 
+    def cells(stone: StoneResult) -> dict[str, str]:
+        """Return the texts of a stone."""
+        return {
+            "stone": stone.code,
+            "stress_error": percent(stone.values["stress_error"]),
+            "von_mises_p99": megapascals(stone.von_mises_p99),
+        }
 
-def _headings(bearer: str, *names: str) -> tuple[str, ...]:
-    """Return the labels of results as headings."""
-    quantities = quantities_of(bearer)
-    return tuple(_capital(quantities[name].label) for name in names)
+    worst = _worst(stones, lambda stone: stone.values.get("stress_error"))
+    return _Section("Stones with the least certain stress", table_of("stone", worst, cells), _STRESS_ERROR)
 
 
 def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float | None]) -> list[StoneResult]:
@@ -344,14 +348,10 @@ def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
     eccentric = np.where(joints.bearing, joints.kern, -np.inf)
     slid = np.where(joints.sliding > seen, joints.sliding, -np.inf)
     opened = np.where(joints.opening > seen, joints.opening, -np.inf)
-    names = "kern", "edge", "pressure_mean", "opening", "sliding", "friction_use"
-    head = "Joint", *_headings("joint", *names)
     return [
-        _Section(
-            "Joints with the most eccentric resultants", head, _joint_rows(result, eccentric, least), _KERN
-        ),
-        _Section("Joints that slid most", head, _joint_rows(result, slid, least)),
-        _Section("Joints that opened most", head, _joint_rows(result, opened, least)),
+        _Section("Joints with the most eccentric resultants", _joint_table(result, eccentric, least), _KERN),
+        _Section("Joints that slid most", _joint_table(result, slid, least)),
+        _Section("Joints that opened most", _joint_table(result, opened, least)),
     ]
 
 
@@ -367,8 +367,9 @@ def _structures(summary: Mapping[str, Any]) -> list[_Section]:
             (structure["code"], *(_value(structure.get(name), quantities[name], summary) for name in shown))
             for structure in of_kind[:_MOST]
         ]
-        head = (_capital(kind.replace("_", " ")), *(_capital(quantities[name].label) for name in shown))
-        sections.append(_Section(f"Results by {kind.replace('_', ' ')}", head, rows))
+        words = kind.replace("_", " ")
+        head = (_capital(words), *(quantities[name].heading for name in shown))
+        sections.append(_Section(f"Results by {words}", Table(head, rows, len(rows))))
     return sections
 
 
@@ -376,19 +377,20 @@ def _value(value: float | None, quantity: Quantity, summary: Mapping[str, Any]) 
     return "–" if value is None else in_words(value, quantity.unit, summary["tolerance"]["length"])
 
 
-def _joint_rows(result: Result, order: Array, least: float) -> list[tuple[str, ...]]:
+def _joint_table(result: Result, order: Array, least: float) -> Table:
     """Describe the joints with the largest finite values of `order`; movements below `least` [m] as such."""
     joints, codes = result.joints, [body.code for body in result.bodies]
-    return [
-        (
-            " – ".join(codes[body] for body in joints.bodies[number]),
-            ratio(float(joints.kern[number])),
-            ratio(float(joints.edge[number])),
-            "sliver" if joints.sliver[number] else kilopascals(float(joints.pressure_mean[number])),
-            millimetres(float(joints.opening[number]), least),
-            millimetres(float(joints.sliding[number]), least),
-            ratio(float(joints.friction_use[number])),
-        )
-        for number in np.argsort(-order, kind="stable")[:_MOST].tolist()
-        if np.isfinite(order[number])
-    ]
+    largest = [k for k in np.argsort(-order, kind="stable")[:_MOST].tolist() if np.isfinite(order[k])]
+    return table_of(
+        "joint",
+        largest,
+        lambda k: {
+            "joint": " – ".join(codes[body] for body in joints.bodies[k]),
+            "kern": ratio(float(joints.kern[k])),
+            "edge": ratio(float(joints.edge[k])),
+            "pressure_mean": "sliver" if joints.sliver[k] else kilopascals(float(joints.pressure_mean[k])),
+            "opening": millimetres(float(joints.opening[k]), least),
+            "sliding": millimetres(float(joints.sliding[k]), least),
+            "friction_use": ratio(float(joints.friction_use[k])),
+        },
+    )

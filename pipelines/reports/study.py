@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import percent, picture, write_page
+from pipelines.reports.html import percent, picture, table_of, write_page
 
 _CAPTIONS = {
     "histogram": "Samples of the quantity, and the share of them that is below each value.",
@@ -36,17 +36,15 @@ def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str])
         version=summary["versions"]["moma"],
         versions=summary["versions"],
         numbers=_numbers(summary),
-        shares=[(name, percent(share)) for name, share in _sorted(summary["shares"]["by_input"])],
-        designs=[_design(number, design) for number, design in enumerate(summary["designs"], start=1)],
-        sobol=[
-            (
-                row["input"],
-                f"{row['first']:.4f} ({row['first_interval'][0]:.3f} to {row['first_interval'][1]:.3f})",
-                f"{row['total']:.4f} ({row['total_interval'][0]:.3f} to {row['total_interval'][1]:.3f})",
-            )
-            for row in summary["sobol"]
-        ],
-        actions=[(action["text"], percent(action["share"])) for action in summary["actions"][:_MAX_ACTIONS]],
+        shares=table_of("shares", _sorted(summary["shares"]["by_input"]), _share),
+        designs=table_of("designs", list(enumerate(summary["designs"], start=1)), _design),
+        sobol=table_of("sobol", summary["sobol"], _indices),
+        actions=table_of(
+            "actions",
+            summary["actions"],
+            lambda action: {"text": action["text"], "share": percent(action["share"])},
+            _MAX_ACTIONS,
+        ),
         certain=summary["certain"],
         figures=[picture(path.parent / name, _CAPTIONS[Path(name).stem]) for name in pictures],
     )
@@ -98,14 +96,28 @@ def _sorted(shares: Mapping[str, float]) -> list[tuple[str, float]]:
     return sorted(shares.items(), key=lambda row: -row[1])
 
 
-def _design(number: int, design: Mapping[str, Any]) -> tuple[str, str, str, str]:
+def _share(share: tuple[str, float]) -> dict[str, str]:
+    return {"input": share[0], "share": percent(share[1])}
+
+
+def _indices(row: Mapping[str, Any]) -> dict[str, str]:
+    """Return both Sobol' indices of an input with their intervals."""
+
+    def index(name: str) -> str:
+        """Return an index with its interval."""
+        low, high = row[f"{name}_interval"]
+        return f"{row[name]:.4f} ({low:.3f} to {high:.3f})"
+
+    return {"input": row["input"], "first": index("first"), "total": index("total")}
+
+
+def _design(numbered: tuple[int, Mapping[str, Any]]) -> dict[str, str]:
+    number, design = numbered
     stands = "" if design["converged"] else " NOT CONVERGED"
-    values = ", ".join(
-        f"{row['label']} {row['value']:.4g} ({row['sigmas']:+.2f} σ)" for row in design["unknowns"][:4]
-    )
-    return (
-        str(number),
-        f"{design['index']:.3f}{stands}",
-        f"{design['probability']:.3g}",
-        values,
-    )
+    values = (f"{row['label']} {row['value']:.4g} ({row['sigmas']:+.2f} σ)" for row in design["unknowns"][:4])
+    return {
+        "number": str(number),
+        "index": f"{design['index']:.3f}{stands}",
+        "probability": f"{design['probability']:.3g}",
+        "unknowns": ", ".join(values),
+    }

@@ -19,7 +19,7 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.surveys import Survey
 from ground.errors import UsageError
 from mechanics.arrays import Array
-from pipelines.reports.html import page_text
+from pipelines.reports.html import Table, page_text, table_of
 from pipelines.reports.page.elevation import elevation
 from pipelines.reports.page.inline import again, packed_models
 from pipelines.reports.page.known import known_stones
@@ -110,10 +110,12 @@ def view_page(
         lead=f"{len(rows)} stones.",
         warnings=(),
         version=version("moma-masonry"),
-        kinds=[(name, str(count)) for name, count in sorted(counts.items())],
-        head=tuple(name.replace("_", " ").capitalize() for name in _TABLE),
-        stones=[tuple(_cell(row[name]) for name in _TABLE) for row in rows[:_MOST]],
-        count=len(rows),
+        kinds=table_of("row", sorted(counts.items()), lambda kind: {"kind": kind[0], "stones": str(kind[1])}),
+        stones=Table(
+            tuple(name.replace("_", " ").capitalize() for name in _TABLE),
+            [tuple(_cell(row[name]) for name in _TABLE) for row in rows[:_MOST]],
+            len(rows),
+        ),
     )
     return text, len(rows)
 
@@ -194,8 +196,8 @@ def write_comparison_view(pages: Sequence[Path], path: Path) -> View:
         viewer=again(packed),
         warnings=(),
         version=version("moma-masonry"),
-        kinds=(),
-        stones=(),
+        kinds=table_of("row", (), dict),
+        stones=table_of("row", (), dict),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")

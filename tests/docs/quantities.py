@@ -17,6 +17,12 @@ from tests.pipelines.results_by_hand import deformable_body, result_of, rigid_bo
 
 Rows = list[Sequence[str]]
 
+SURVEY_TABLES = (
+    *("measure_again", "beds", "faces", "odd", "depths", "since", "control", "evidence"),
+    *("courses", "kinds", "contradictions", "stones"),
+)
+"""Tables of survey.json that its page shows."""
+
 PAGES = ("formats.md", "query.md", "runs.md")
 """Pages of docs/ that have such tables."""
 
@@ -40,6 +46,21 @@ def _columns(meanings: Mapping[str, str]) -> Rows:
     return [(f"`{name}`", meaning) for name, meaning in meanings.items()]
 
 
+def _headed(*bearers: str, named: bool = False) -> Rows:
+    """Return name, heading, unit and meaning of the quantities of reports; `named`: of which table, first."""
+    return [
+        (
+            *([f"`{bearer}`"] if named else []),
+            f"`{one.name}`",
+            one.heading,
+            "" if one.unit in (None, "-") else str(one.unit),
+            one.meaning,
+        )
+        for bearer in bearers
+        for one in quantities_of(bearer).values()
+    ]
+
+
 def _tables() -> Mapping[str, Sequence[Rows]]:
     """Return the rows of the tables under each heading."""
     result = _result()
@@ -60,6 +81,11 @@ def _tables() -> Mapping[str, Sequence[Rows]]:
             _columns(JOINT_COLUMNS),
         ],
         "## Time series (": [_columns(one) for one in SERIES_COLUMNS.values()],
+        "## Columns of a cell": [
+            _columns({one.name: one.described for one in quantities_of("cell of disks").values()})
+        ],
+        "## Numbers of a load": [_headed("load in assessment.json")],
+        "## Tables of the page": [_headed(*SURVEY_TABLES, named=True)],
         "### Results of runs": [
             [(f"`{one.name}`", one.type_name, one.definition) for one in attributes() if one.of_run]
         ],

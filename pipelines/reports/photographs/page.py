@@ -1,11 +1,12 @@
 """The page of oriented photographs, by itself and as a part of the survey report."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pipelines.draw.photographs import draw_network, draw_photo_residuals
-from pipelines.reports.html import picture, write_page
+from pipelines.reports.html import picture, table_of, write_page
 
 _MAX_ROWS = 200  # rows of a table; orientation.json has them all
 
@@ -72,15 +73,10 @@ def photographs_section(
         "pictures": [picture(folder / name, caption) for name, caption in pictures.items()],
         "adjustment": _adjustment(values),
         "cameras": [_camera(camera) for camera in values["cameras"]],
-        "photos": [_photo(photo) for photo in values["photos"][:_MAX_ROWS]],
-        "control": [_control(one) for one in values["control"][:_MAX_ROWS]],
-        "suspected": [_mark(marks, k) for k in suspected[:_MAX_ROWS]],
-        "suspects": len(suspected),
-        "correlations": [
-            (correlation["of"], correlation["a"], correlation["b"], f"{100.0 * correlation['value']:.1f} %")
-            for correlation in values["correlations"][:_MAX_ROWS]
-        ],
-        "most": _MAX_ROWS,
+        "photos": table_of("photographs", values["photos"], _photo, _MAX_ROWS),
+        "control": table_of("control of photographs", values["control"], _control, _MAX_ROWS),
+        "suspected": table_of("suspected marks", suspected, partial(_mark, marks), _MAX_ROWS),
+        "correlations": table_of("correlations", values["correlations"], _correlation, _MAX_ROWS),
     }
 
 
@@ -109,41 +105,55 @@ def _adjustment(values: Mapping[str, Any]) -> list[Row]:
 
 def _camera(camera: Mapping[str, Any]) -> dict[str, Any]:
     rows = [
-        (name, f"{value['value']:.8g}", f"± {value['sigma']:.3g}" if value["sigma"] else "held")
+        {
+            "parameter": name,
+            "value": f"{value['value']:.8g}",
+            "sigma": f"± {value['sigma']:.3g}" if value["sigma"] else "held",
+        }
         for name, value in camera["parameters"].items()
     ]
     width, height = camera["size"]
     return {
         "name": f"{camera['name']}: {camera['model']} model, {width} × {height} pixels, {camera['unit']}",
-        "rows": rows,
+        "rows": table_of("camera", rows, dict),
     }
 
 
-def _photo(photo: Mapping[str, Any]) -> Row:
+def _photo(photo: Mapping[str, Any]) -> dict[str, str]:
     sigma = photo["sigma"]
-    angles = (f"{photo[name]:.4f} ± {sigma[name]:.4f}°" for name in ("omega", "phi", "kappa"))
-    places = (f"{photo[name]:.4f} ± {sigma[name]:.4f} m" for name in "xyz")
-    return (
-        photo["name"],
-        *angles,
-        *places,
-        str(photo["marks"]),
-        "–" if photo["rms"] is None else f"{photo['rms']:.2f} px",
-    )
+    return {
+        "photograph": photo["name"],
+        **{name: f"{photo[name]:.4f} ± {sigma[name]:.4f}°" for name in ("omega", "phi", "kappa")},
+        **{name: f"{photo[name]:.4f} ± {sigma[name]:.4f} m" for name in "xyz"},
+        "marks": str(photo["marks"]),
+        "rms": "–" if photo["rms"] is None else f"{photo['rms']:.2f} px",
+    }
 
 
-def _control(point: Mapping[str, Any]) -> Row:
-    test = "–" if point["use"] == "fixed" else f"{point['test']:.2f}"
-    return (point["id"], point["use"], *(f"{1e3 * value:z.1f} mm" for value in point["residual"]), test)
+def _control(point: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "id": point["id"],
+        "use": point["use"],
+        **{
+            f"residual_{axis}": f"{1e3 * value:z.1f} mm"
+            for axis, value in zip("xyz", point["residual"], strict=True)
+        },
+        "test": "–" if point["use"] == "fixed" else f"{point['test']:.2f}",
+    }
 
 
-def _mark(marks: Mapping[str, Any], k: int) -> Row:
+def _correlation(correlation: Mapping[str, Any]) -> dict[str, str]:
+    names = {name: str(correlation[name]) for name in ("of", "a", "b")}
+    return names | {"value": f"{100.0 * correlation['value']:.1f} %"}
+
+
+def _mark(marks: Mapping[str, Any], k: int) -> dict[str, str]:
     vx, vy, test = marks["vx"][k], marks["vy"][k], marks["test"][k]
-    return (
-        marks["photo"][k],
-        marks["point"][k],
-        str(marks["line"][k]) if marks["line"][k] > 0 else "–",
-        "–" if vx is None else f"{vx:z.2f}, {vy:z.2f} px",
-        "–" if test is None else f"{test:.1f} σ",
-        "left out" if marks["verdict"][k] == "removed" else "suspected",
-    )
+    return {
+        "photograph": marks["photo"][k],
+        "point": marks["point"][k],
+        "line": str(marks["line"][k]) if marks["line"][k] > 0 else "–",
+        "residual": "–" if vx is None else f"{vx:z.2f}, {vy:z.2f} px",
+        "test": "–" if test is None else f"{test:.1f} σ",
+        "verdict": "left out" if marks["verdict"][k] == "removed" else "suspected",
+    }

@@ -1,30 +1,31 @@
 """report.html of a survey: one page by which the surveyor decides what to measure again."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pipelines.reports.html import picture, write_page
+from pipelines.reports.html import Table, picture, table_of, write_page
 from pipelines.reports.page.model import Column
 from pipelines.reports.page.surveys import survey_model
 from pipelines.reports.survey.campaigns import MovedStone, comparison_lines
 from pipelines.reports.survey.document import finding_of
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
-from survey.quality.canon import Deviation
-from survey.quality.contradictions import Contradiction
+from survey.quality.canon import Deviation, KindStandard
+from survey.quality.contradictions import SIGNIFICANT, Contradiction
 from survey.quality.courses import CourseHeight, CourseLine
-from survey.quality.departures.beds import WallBeds
-from survey.quality.departures.faces import WallFace
-from survey.quality.masonry.index import PARAMETERS
+from survey.quality.departures.beds import OddBed, WallBeds
+from survey.quality.departures.depths import DoubtfulDepth
+from survey.quality.departures.faces import OddStone, WallFace
+from survey.quality.masonry.index import PARAMETERS, Direction, Parameter
 from survey.quality.masonry.walls import MasonryQuality
 from survey.quality.precision import StoneQuality
 from survey.quality.remeasure import Remeasure
 
 _MAX_ROWS = 300  # rows of a table; survey.json has them all
 
-T = TypeVar("T")
-Row = tuple[str, ...]
+Row = dict[str, str]
 
 
 def write_survey_page(
@@ -46,7 +47,6 @@ def write_survey_page(
     """
     inside = {name: picture(path.parent / name, caption) for name, caption in pictures.items()}
     facade_of = {i: facade.name for facade in study.facades for i in facade.members.tolist()}
-    deviation_of = {deviation.code: deviation for deviation in study.deviations}
     write_page(
         path,
         "survey.html",
@@ -59,31 +59,26 @@ def write_survey_page(
         residuals=[one for name, one in inside.items() if name == "residuals.png"],
         facades=len(study.facades),
         plumb=[one for name, one in inside.items() if name.startswith("plumb")],
-        remeasures=[_remeasure_row(row) for row in study.again.rows],
+        remeasures=table_of("measure_again", study.again.rows, _remeasure_row),
         more_stones=study.again.more,
         left=study.again.left,
-        movements=list(_movements(study)),
-        faces=list(_faces(study)),
-        odd=_first(_odd(study), lambda row: row),
-        depths=_first(
-            study.depths, lambda doubt: (doubt.code, doubt.against, doubt.text, f"{doubt.score:.1f} σ")
-        ),
+        movements=table_of("beds", list(_movements(study)), dict),
+        faces=table_of("faces", list(_faces(study)), dict),
+        odd=table_of("odd", _odd(study), dict, _MAX_ROWS),
+        depths=table_of("depths", study.depths, _doubt_row, _MAX_ROWS),
         masonry=list(_masonry(study)),
         quality=_overall(study),
         control=list(_control(study.files)),
         courses=list(_courses(study)),
-        kinds=_kinds(study),
+        kinds=table_of("kinds", list(study.usual.values()), partial(_kind_row, study)),
         since=None if study.since is None else list(comparison_lines(study.since)),
-        displacements=_first(() if study.since is None else study.since.stones, _moved_row),
-        photographs=photographs,
-        located=_first(list(_located(study)), lambda row: row),
-        contradictions=_first(study.contradictions, _contradiction_row),
-        stones=_first(
-            _by_urgency(study),
-            lambda i: _stone_row(
-                study.stones[i], facade_of.get(i, "–"), deviation_of.get(study.stones[i].code)
-            ),
+        displacements=table_of(
+            "since", () if study.since is None else study.since.stones, _moved_row, _MAX_ROWS
         ),
+        photographs=photographs,
+        located=table_of("evidence", list(_located(study)), dict, _MAX_ROWS),
+        contradictions=table_of("contradictions", study.contradictions, _contradiction_row, _MAX_ROWS),
+        stones=_stones(study, facade_of),
         version=version,
     )
 
@@ -92,14 +87,14 @@ def _moved_row(stone: MovedStone) -> Row:
     """Return the displacement of a stone since the earlier campaign."""
     x, y, z = (f"{1e3 * value:+.1f}" for value in stone.displacement.vector)
     moved = stone.displacement
-    return (
-        stone.code,
-        f"{1e3 * moved.distance:.1f} ± {1e3 * moved.sigma:.1f}",
-        f"{moved.distance / moved.sigma:.1f} σ",
-        f"{x}, {y}, {z}",
-        f"{1e3 * stone.outwards:+.1f}",
-        "moved" if moved.significant else "–",
-    )
+    return {
+        "stone": stone.code,
+        "distance": f"{1e3 * moved.distance:.1f} ± {1e3 * moved.sigma:.1f}",
+        "score": f"{moved.distance / moved.sigma:.1f} σ",
+        "displacement": f"{x}, {y}, {z}",
+        "outwards": f"{1e3 * stone.outwards:+.1f}",
+        "significant": "moved" if moved.significant else "–",
+    }
 
 
 def _facades_column(study: SurveyStudy, facade_of: Mapping[int, str]) -> Column:
@@ -122,18 +117,18 @@ def _located(study: SurveyStudy) -> Iterator[Row]:
             if point["role"] == "vertex":
                 rays: Any = point["rays"]
                 sigma: Any = point["sigma"]
-                yield (
-                    stone.code,
-                    str(point["point"]),
-                    " × ".join(f"{1e3 * value:.1f}" for value in sigma) + " mm",
-                    str(point["how"]),
-                    "; ".join(f"{ray['photo']} ({ray['x']:.1f}, {ray['y']:.1f})" for ray in rays),
-                )
+                yield {
+                    "stone": stone.code,
+                    "point": str(point["point"]),
+                    "sigma": " × ".join(f"{1e3 * value:.1f}" for value in sigma) + " mm",
+                    "how": str(point["how"]),
+                    "rays": "; ".join(f"{ray['photo']} ({ray['x']:.1f}, {ray['y']:.1f})" for ray in rays),
+                }
 
 
-def _first(items: Sequence[T], row: Callable[[T], Row]) -> dict[str, Any]:
-    """Describe the first items by a row each, and count all of them."""
-    return {"rows": [row(item) for item in items[:_MAX_ROWS]], "count": len(items)}
+def _doubt_row(doubt: DoubtfulDepth) -> Row:
+    score = f"{doubt.score:.1f} σ"
+    return {"stone": doubt.code, "against": doubt.against, "text": doubt.text, "score": score}
 
 
 def _lead(study: SurveyStudy) -> str:
@@ -153,19 +148,30 @@ def _place(wall: WallBeds | WallFace | MasonryQuality) -> str:
 
 
 def _remeasure_row(remeasure: Remeasure) -> Row:
-    line = str(remeasure.line) if remeasure.line else "–"
-    return (remeasure.code or "(no code)", remeasure.changes or "–", remeasure.reason, remeasure.action, line)
+    return {
+        "stone": remeasure.code or "(no code)",
+        "changes": remeasure.changes or "–",
+        "reason": remeasure.reason,
+        "action": remeasure.action,
+        "line": str(remeasure.line) if remeasure.line else "–",
+    }
 
 
 def _movements(study: SurveyStudy) -> Iterator[Row]:
     """Yield what the beds of each wall tell: wall, finding, age, probability, what is excluded."""
     for wall in study.beds:
-        place, bound = _place(wall), _bound(wall.excluded)
-        for movement in wall.movements:
-            yield (place, movement.text, movement.dating, _percent(movement.probability), bound)
-        if not wall.movements:
-            none = "not tested: too few stones" if wall.excluded is None else "no movement found"
-            yield (place, none, "–", "–", bound)
+        found = [
+            (movement.text, movement.dating, _percent(movement.probability)) for movement in wall.movements
+        ]
+        none = "not tested: too few stones" if wall.excluded is None else "no movement found"
+        for text, dating, probability in found or [(none, "–", "–")]:
+            yield {
+                "wall": _place(wall),
+                "text": text,
+                "dating": dating,
+                "probability": probability,
+                "excluded": _bound(wall.excluded),
+            }
 
 
 def _faces(study: SurveyStudy) -> Iterator[Row]:
@@ -176,24 +182,27 @@ def _faces(study: SurveyStudy) -> Iterator[Row]:
             if math.isfinite(wall.lean_sigma)
             else "–"
         )
-        head = (_place(wall), lean, _mm(wall.scatter))
-        tail = (_bound(wall.excluded), _bound(wall.excluded_stone))
-        for movement in wall.movements:
-            yield (*head, movement.text, _percent(movement.probability), *tail)
-        if not wall.movements:
-            yield (*head, "no movement found" if wall.excluded is not None else "not tested", "–", *tail)
+        found = [(movement.text, _percent(movement.probability)) for movement in wall.movements]
+        none = "not tested" if wall.excluded is None else "no movement found"
+        for text, probability in found or [(none, "–")]:
+            yield {
+                "wall": _place(wall),
+                "lean": lean,
+                "scatter": _mm(wall.scatter),
+                "text": text,
+                "probability": probability,
+                "excluded": _bound(wall.excluded),
+                "excluded_stone": _bound(wall.excluded_stone),
+            }
 
 
 def _odd(study: SurveyStudy) -> list[Row]:
-    rows = [
-        (stone.code, stone.text, stone.amount / stone.sigma) for wall in study.faces for stone in wall.odd
-    ]
-    rows += [
-        (stone.code, stone.text, stone.amount / stone.sigma) for wall in study.beds for stone in wall.odd
-    ]
+    odd: list[OddStone | OddBed] = [stone for face in study.faces for stone in face.odd]
+    odd += [stone for wall in study.beds for stone in wall.odd]
+    odd.sort(key=lambda stone: -abs(stone.amount / stone.sigma))
     return [
-        (code, text, f"{abs(score):.1f} σ")
-        for code, text, score in sorted(rows, key=lambda row: -abs(row[2]))
+        {"stone": stone.code, "text": stone.text, "score": f"{abs(stone.amount / stone.sigma):.1f} σ"}
+        for stone in odd
     ]
 
 
@@ -204,20 +213,28 @@ def _masonry(study: SurveyStudy) -> Iterator[dict[str, Any]]:
         yield {
             "name": _place(wall),
             "stones": len(wall.stones),
-            "grades": [
-                (name, PARAMETERS[name], wall.grades[name].words, wall.grades[name].text)
-                for name in PARAMETERS
-            ],
-            "indices": [
-                (direction.replace("_", " "), f"{low:.1f} to {high:.1f}", wall.categories[direction])
-                for direction, (low, high) in wall.indices.items()
-            ],
+            "grades": table_of("grade", list(PARAMETERS), partial(_grade_row, wall)),
+            "indices": table_of("index", list(wall.indices), partial(_index_row, wall)),
             "strengths": [
                 ("compressive strength", _range(strengths["compressive_strength"], 1e6, "MPa", 1)),
                 ("shear strength without pressure", _range(strengths["shear_strength"], 1e6, "MPa", 3)),
                 ("Young's modulus", _range(strengths["young"], 1e9, "GPa", 2)),
             ],
         }
+
+
+def _grade_row(wall: MasonryQuality, symbol: Parameter) -> Row:
+    grade = wall.grades[symbol]
+    return {"symbol": symbol, "parameter": PARAMETERS[symbol], "grade": grade.words, "text": grade.text}
+
+
+def _index_row(wall: MasonryQuality, direction: Direction) -> Row:
+    low, high = wall.indices[direction]
+    return {
+        "direction": direction.replace("_", " "),
+        "index": f"{low:.1f} to {high:.1f}",
+        "category": wall.categories[direction],
+    }
 
 
 def _range(ends: tuple[float, float], unit: float, name: str, digits: int) -> str:
@@ -233,7 +250,12 @@ def _percent(probability: float) -> str:
 
 
 def _contradiction_row(contradiction: Contradiction) -> Row:
-    return (contradiction.code, contradiction.kind, contradiction.text, f"{contradiction.significance:.1f} σ")
+    return {
+        "stone": contradiction.code,
+        "kind": contradiction.kind,
+        "text": contradiction.text,
+        "significance": f"{contradiction.significance:.1f} σ",
+    }
 
 
 def _overall(study: SurveyStudy) -> list[tuple[str, str]]:
@@ -260,13 +282,16 @@ def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
         if (fit := file.transform) is None:
             continue
         rows = [
-            (
-                name,
-                *(f"{value * 1e3:z.1f} mm" for value in residual),
-                "–" if math.isnan(test) else f"{test:.2f}",
-                "–" if math.isnan(limit) else f"{limit:.2f}",
-                "left out as a blunder" if name in fit.rejected else "",
-            )
+            {
+                "name": name,
+                **{
+                    f"residual_{axis}": f"{value * 1e3:z.1f} mm"
+                    for axis, value in zip("xyz", residual, strict=True)
+                },
+                "standardised": "–" if math.isnan(test) else f"{test:.2f}",
+                "limit": "–" if math.isnan(limit) else f"{limit:.2f}",
+                "rejected": "left out as a blunder" if name in fit.rejected else "",
+            }
             for name, residual, test, limit in zip(
                 fit.names, fit.residuals.tolist(), fit.standardised.tolist(), fit.limits.tolist(), strict=True
             )
@@ -277,7 +302,7 @@ def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
             "redundancy": fit.redundancy,
             "scale": f"{(fit.scale - 1.0) * 1e6:+z.0f} ± {1e6 * math.sqrt(fit.covariance[6, 6]):.0f} mm per km",
             "scale_differs": fit.scale_differs,
-            "rows": rows,
+            "points": table_of("control", rows, dict),
         }
 
 
@@ -290,7 +315,9 @@ def _courses(study: SurveyStudy) -> Iterator[dict[str, Any]]:
         yield {
             "name": facade,
             "tilt": f"{tilted * 1e3:.2f}" if tilted else None,
-            "lines": _first(lines, lambda line: _course_row(line, heights, study.beds)),
+            "lines": table_of(
+                "courses", lines, lambda line: _course_row(line, heights, study.beds), _MAX_ROWS
+            ),
         }
 
 
@@ -301,36 +328,34 @@ def _course_row(
 ) -> Row:
     code, farthest = line.worst
     height = heights.get((line.facade, line.zone, line.course))
-    return (
-        f"{line.course}" if line.zone is None else f"{line.zone}, {line.course}",
-        str(len(line.stones)),
-        f"{line.level:z.3f} m",
-        _plus_minus(line.slope, line.slope_sigma, 1e3, "mm/m", 2) + _chance(line.slope_probability),
-        _plus_minus(line.sag, line.sag_sigma, 1e3, "mm", 1) + _chance(line.sag_probability),
-        _mm(line.rms),
-        f"{farthest * 1e3:z.1f} mm, {code}",
-        _mm(line.scatter) if line.evidence != "none" else "–",
-        "–" if height is None else f"{height.height:.4f} ± {height.sigma:.4f} m",
-        finding_of(line, walls),
+    return {
+        "course": f"{line.course}" if line.zone is None else f"{line.zone}, {line.course}",
+        "stones": str(len(line.stones)),
+        "level": f"{line.level:z.3f} m",
+        "slope": _plus_minus(line.slope, line.slope_sigma, 1e3, "mm/m", 2) + _chance(line.slope_probability),
+        "sag": _plus_minus(line.sag, line.sag_sigma, 1e3, "mm", 1) + _chance(line.sag_probability),
+        "rms": _mm(line.rms),
+        "worst": f"{farthest * 1e3:z.1f} mm, {code}",
+        "scatter": _mm(line.scatter) if line.evidence != "none" else "–",
+        "height": "–" if height is None else f"{height.height:.4f} ± {height.sigma:.4f} m",
+        "finding": finding_of(line, walls),
+    }
+
+
+def _kind_row(study: SurveyStudy, kind: KindStandard) -> Row:
+    odd = [one for one in study.deviations if one.kind == kind.kind and one.worst > SIGNIFICANT]
+    odd.sort(key=lambda stone: -stone.worst)
+    named = (
+        f"{stone.code} ({stone.length * 1e3:+z.0f} mm long, {stone.height * 1e3:+z.0f} mm high)"
+        for stone in odd[:_MAX_ROWS]
     )
-
-
-def _kinds(study: SurveyStudy) -> list[Row]:
-    return [
-        (
-            kind.kind,
-            f"{kind.length:.3f} ± {kind.length_scatter:.3f} m",
-            f"{kind.height:.3f} ± {kind.height_scatter:.3f} m",
-            kind.source,
-            ", ".join(
-                f"{odd.code} ({odd.length * 1e3:+z.0f} mm long, {odd.height * 1e3:+z.0f} mm high)"
-                for odd in sorted(study.deviations, key=lambda odd: -odd.worst)[:_MAX_ROWS]
-                if odd.kind == kind.kind and odd.worst > 3.0
-            )
-            or "none",
-        )
-        for kind in study.usual.values()
-    ]
+    return {
+        "kind": kind.kind,
+        "length": f"{kind.length:.3f} ± {kind.length_scatter:.3f} m",
+        "height": f"{kind.height:.3f} ± {kind.height_scatter:.3f} m",
+        "source": kind.source,
+        "odd": ", ".join(named) or "none",
+    }
 
 
 def _by_urgency(study: SurveyStudy) -> list[int]:
@@ -341,24 +366,38 @@ def _by_urgency(study: SurveyStudy) -> list[int]:
     )
 
 
+def _stones(study: SurveyStudy, facade_of: Mapping[int, str]) -> Table:
+    """Return the table of all stones."""
+    deviation_of = {deviation.code: deviation for deviation in study.deviations}
+
+    def cells(i: int) -> Row:
+        """Return the texts of a stone, by its number."""
+        stone = study.stones[i]
+        return _stone_row(stone, facade_of.get(i, "–"), deviation_of.get(stone.code))
+
+    return table_of("stones", _by_urgency(study), cells, _MAX_ROWS)
+
+
 def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> Row:
-    return (
-        stone.code,
-        stone.kind,
-        "–" if stone.course is None else str(stone.course),
-        facade,
-        _mm(stone.rms) if stone.redundancy else "–",
-        "–" if stone.sigma0 is None else f"{stone.sigma0:.2f}",
-        str(stone.redundancy),
-        ", ".join((*stone.blunders, *stone.worn)) or "none",
-        "; ".join((stone.shape_text if stone.measured else stone.provenance, *stone.remarks)),
-        f"{stone.tilt_sigma:.2f}°" if math.isfinite(stone.tilt_sigma) else "–",
-        f"{stone.length:.3f} × {stone.height:.3f}"
-        + (f" ± {stone.dimension_sigma:.3f} m" if math.isfinite(stone.dimension_sigma) else " m"),
-        "–" if off is None else f"{off.length * 1e3:+z.0f} × {off.height * 1e3:+z.0f} mm ({off.worst:.1f} σ)",
-        _depth(stone),
-        f"{stone.depth_source} ({stone.depth_origin})",
-    )
+    sigma = f" ± {stone.dimension_sigma:.3f}" if math.isfinite(stone.dimension_sigma) else ""
+    return {
+        "stone": stone.code,
+        "kind": stone.kind,
+        "course": "–" if stone.course is None else str(stone.course),
+        "facade": facade,
+        "rms": _mm(stone.rms) if stone.redundancy else "–",
+        "sigma0": "–" if stone.sigma0 is None else f"{stone.sigma0:.2f}",
+        "redundancy": str(stone.redundancy),
+        "blunders": ", ".join((*stone.blunders, *stone.worn)) or "none",
+        "shape": "; ".join((stone.shape_text if stone.measured else stone.provenance, *stone.remarks)),
+        "tilt_sigma": f"{stone.tilt_sigma:.2f}°" if math.isfinite(stone.tilt_sigma) else "–",
+        "length": f"{stone.length:.3f} × {stone.height:.3f}{sigma} m",
+        "deviation": "–"
+        if off is None
+        else f"{off.length * 1e3:+z.0f} × {off.height * 1e3:+z.0f} mm ({off.worst:.1f} σ)",
+        "depth": _depth(stone),
+        "depth_source": f"{stone.depth_source} ({stone.depth_origin})",
+    }
 
 
 def _depth(stone: StoneQuality) -> str:

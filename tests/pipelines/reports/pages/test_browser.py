@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mechanics.scene.shapes import BOX_FACES, box_corners
-from pipelines.reports.html import write_page
+from pipelines.reports.html import table_of, write_page
 from pipelines.reports.page.model import Column, Event, Model
 from pipelines.reports.page.paper import print_pdf
 from pipelines.reports.page.scenes import run_model
@@ -47,10 +47,8 @@ def page_of(model, path):
         lead="",
         warnings=(),
         version="1",
-        kinds=(),
-        stones=(),
-        count=0,
-        head=(),
+        kinds=table_of("row", (), dict),
+        stones=table_of("row", (), dict),
     )
     return path
 

@@ -6,7 +6,7 @@ import string
 import pytest
 
 from ground.errors import MomaError, UsageError
-from pipelines.reports.html import page_text
+from pipelines.reports.html import page_text, table_of
 from pipelines.reports.page import paper
 from pipelines.reports.page.inline import module_text
 from pipelines.reports.page.languages import catalogues
@@ -20,14 +20,15 @@ VALUES = {
     "lead": "2 stones.",
     "warnings": (),
     "version": "1.2",
-    "count": 2,
-    "head": ("Code",),
 }
+NOTHING = table_of("row", (), dict)
 
 
 @pytest.fixture(scope="module")
 def text():
-    return page_text("view.html", wall_model(4), kinds=[("header", "2")], stones=[("A",)], **VALUES)
+    kinds = table_of("row", [{"kind": "header", "stones": "2"}], dict)
+    stones = table_of("row", [{"stone": "A"}], dict)
+    return page_text("view.html", wall_model(4), kinds=kinds, stones=stones, **VALUES)
 
 
 def test_a_changed_page_does_not_have_its_checksum(text):
@@ -48,7 +49,7 @@ def test_the_title_block_has_room_for_the_author_or_names_him(text, monkeypatch)
     assert "<tr><th>Building</th><td>A &lt;b&gt; tower</td></tr>" in text
     assert "<tr><th>Author</th><td>&nbsp;</td></tr>" in text
     monkeypatch.setenv("MOMA_AUTHOR", "M. <i>Mason</i>")
-    named = page_text("view.html", kinds=(), stones=(), **VALUES)
+    named = page_text("view.html", kinds=NOTHING, stones=NOTHING, **VALUES)
     assert "<tr><th>Author</th><td>M. &lt;i&gt;Mason&lt;/i&gt;</td></tr>" in named
 
 

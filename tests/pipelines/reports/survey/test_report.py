@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from archmodel.quantities import quantities_of
 from ground.errors import SurveyError, UsageError
 from moma.cli.text.runs_and_surveys import survey_report_lines
 from pipelines.ingest.reading_options import reading_options
@@ -82,6 +83,15 @@ def test_the_numbers_are_those_of_the_sample(window):
     )
     assert first["depth"] == pytest.approx(0.51)
     assert first["depth_origin"] == "stone"
+
+
+@pytest.mark.parametrize("table", ["courses", "kinds", "stones"])
+def test_what_the_page_shows_of_a_table_stands_under_that_name_in_the_file(window, table):
+    # heights between beds and stones that differ from their kind come from other tables
+    elsewhere = {"courses": {"height"}, "kinds": {"odd"}}.get(table, set())
+    rows = contents(window)[table]
+    assert rows
+    assert set(quantities_of(table)) - elsewhere <= set(rows[0])
 
 
 def test_the_true_beds_of_the_sample_are_level_and_found_so(window):
