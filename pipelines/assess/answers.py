@@ -171,15 +171,16 @@ def _load(
     live = question.live
     bound = limit_load(on, live)
     candidate = _candidate(on, live, bound)
-    limit, lost, sure, kind = _limit(on, live, bound, candidate)
+    capacity = _capacity_of(on, live, bound, candidate)
+    limit = capacity.limit
     facts: dict[str, Any] = {
         "name": question.name,
         "kind": "load",
         "meaning": str(live),
         "limit": _number(limit.multiplier),
-        "limit_lost": _number(lost),
-        "limit_sure": _number(sure),
-        "limit_kind": kind,
+        "limit_lost": _number(capacity.lost),
+        "limit_sure": _number(capacity.sure),
+        "limit_kind": capacity.kind,
         "bound": _number(bound.multiplier),
         "bound_kind": "associative friction, rigorous upper bound",
         "candidate": None if candidate is None else _number(candidate.multiplier),
@@ -197,14 +198,16 @@ def _load(
     if question.whole and np.isfinite(limit.multiplier):
         facts["tilt"] = float(np.degrees(np.arctan(limit.multiplier)))
     # where the step from rest decides nothing, only runs can
-    if not np.isnan(bound.multiplier) and (question.confirm or kind == _UNSURE):
+    if not np.isnan(bound.multiplier) and (question.confirm or capacity.kind == _UNSURE):
         first = limit.multiplier if np.isfinite(limit.multiplier) else _FIRST
         facts["confirmation"] = _confirmed(on, confirming(live, first, bound.multiplier), limit)
         if facts["confirmation"]["lost"] is not None:
             facts["outcome"] = "limited"
     if isinstance(live, Acceleration) and np.isfinite(limit.multiplier):
         code = None if question.code is None or site is None else (question.code, site)
-        facts["kinematics"], checked = _kinematics(on, live, _checked_limit(limit, lost, candidate), code)
+        facts["kinematics"], checked = _kinematics(
+            on, live, _checked_limit(limit, capacity.lost, candidate), code
+        )
         if checked:
             facts["code"] = checked
     curve = _led(live, limit, facts, leading) if question.pushover else None
@@ -233,23 +236,37 @@ def _without_friction_across(on: RigidAssembly, live: LiveLoad, candidate: Limit
     return multiplier if multiplier < (1.0 - _SAME) * candidate.multiplier else None
 
 
-def _limit(
-    on: RigidAssembly, live: LiveLoad, bound: LimitLoad, candidate: LimitLoad | None
-) -> tuple[LimitLoad, float, float, str]:
-    """Return the limit with its mechanism, the least load that is lost, up to which it is sure, and what it is.
+@dataclass(frozen=True)
+class _Capacity:
+    """Load that the stones bear.
 
-    As a rule the largest load that a step from rest holds, and how the stones begin to fall under the least that it
-    loses.
+    Attributes
+    ----------
+    limit : the load with its mechanism; as a rule the largest that a step from rest holds, and how the stones begin
+        to fall under the least that it loses
+    lost : least load factor that is lost [-]
+    sure : load factor up to which no method or step decides [-]
+    kind : what the limit is, in words
     """
+
+    limit: LimitLoad
+    lost: float
+    sure: float
+    kind: str
+
+
+def _capacity_of(
+    on: RigidAssembly, live: LiveLoad, bound: LimitLoad, candidate: LimitLoad | None
+) -> _Capacity:
     if np.isnan(bound.multiplier):
-        return bound, 0.0, 0.0, _BY_RUNS
+        return _Capacity(bound, 0.0, 0.0, _BY_RUNS)
     if on.crushing is not None and candidate is not None:
-        return candidate, bound.multiplier, candidate.multiplier, _CRUSHED
+        return _Capacity(candidate, bound.multiplier, candidate.multiplier, _CRUSHED)
     lowest = None if candidate is None or not candidate.converged else candidate.lowest.multiplier
     confirmed = held_limit(on, live, bound, lowest)
     if confirmed.lost == 0.0:
         limit = candidate or bound
-        return limit, bound.multiplier, limit.multiplier, _UNSURE
+        return _Capacity(limit, bound.multiplier, limit.multiplier, _UNSURE)
     limit = replace(
         bound,
         flow=Flow.COULOMB,
@@ -258,7 +275,7 @@ def _limit(
         mechanism=confirmed.mechanism or bound.mechanism,
         programmes=confirmed.problems,
     )
-    return limit, confirmed.lost, confirmed.sure, _BY_RUNS
+    return _Capacity(limit, confirmed.lost, confirmed.sure, _BY_RUNS)
 
 
 def _checked_limit(limit: LimitLoad, lost: float, candidate: LimitLoad | None) -> LimitLoad:
