@@ -1,5 +1,6 @@
 """The commands of the documentation run as they are written; the main job runs on rigid stones here."""
 
+import importlib
 import os
 import re
 import shlex
@@ -178,6 +179,16 @@ def test_the_design_pages_name_files_that_exist_and_all_stand_in_the_index():
         assert f"]({page.name})" in index, page.name
         for path in re.findall(r"`(\w+(?:/\w+)+(?:\.\w+)?)`", page.read_text(encoding="utf-8")):
             assert (ROOT / path).exists(), (page.name, path)
+
+
+def test_things_are_made_where_the_page_on_rooms_says():
+    page = (ROOT / "docs/design/packages-and-rooms.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| [^|]+ \| `([\w.]+)` \| `([\w/]+\.py)` \|", page, re.MULTILINE)
+    assert len(rows) > 10
+    for name, path in rows:
+        place: object = importlib.import_module(path.removesuffix(".py").replace("/", "."))
+        for part in name.split("."):
+            place = getattr(place, part)
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="an archive of the project has no history")
