@@ -25,6 +25,11 @@ class Closure:
     power: float = 1.0
     floor: float = np.inf
 
+    @property
+    def linear(self) -> bool:
+        """True where the stiffness is the same at all pressures."""
+        return self.power == 1.0
+
     def _over(self, closure: Array) -> Array:
         """Return y/y_f (n,), one at least."""
         over: Array = np.maximum(closure * self.stiffness / self.floor, 1.0)
@@ -32,14 +37,14 @@ class Closure:
 
     def pressure(self, closure: Array) -> Array:
         """Return p (n,) at closures y ≥ 0 [Pa]."""
-        if self.power == 1.0:
+        if self.linear:
             return self.stiffness * closure
         pressure: Array = self.stiffness * closure * self._over(closure) ** (self.power - 1.0)
         return pressure
 
     def tangent(self, closure: Array) -> Array:
         """Return dp/dy (n,) [Pa/m]."""
-        if self.power == 1.0:
+        if self.linear:
             return self.stiffness
         over = self._over(closure)
         steeper = np.where(over > 1.0, self.power * over ** (self.power - 1.0), 1.0)
@@ -48,7 +53,7 @@ class Closure:
 
     def energy(self, closure: Array) -> Array:
         """Return ∫p dy (n,) [J/m²]."""
-        if self.power == 1.0:
+        if self.linear:
             linear: Array = 0.5 * self.stiffness * closure**2
             return linear
         over, m = self._over(closure), self.power
@@ -65,7 +70,7 @@ class Closure:
     def at_energy(self, energy: Array) -> Array:
         """Return the closure y (n,) at which a joint holds an energy ≥ 0 [m]."""
         m, below = self.power, np.sqrt(2.0 * energy / self.stiffness)
-        if m == 1.0:
+        if self.linear:
             return below
         first = self.floor / self.stiffness
         over = 1.0 + (m + 1.0) * np.maximum(energy / (self.stiffness * first**2) - 0.5, 0.0)
@@ -74,6 +79,6 @@ class Closure:
 
     def stiffer(self, pressure: Array) -> Array:
         """Return p/y over k (n,) at pressures [-]."""
-        if self.power == 1.0:
+        if self.linear:
             return np.ones(len(pressure))
         return np.maximum(pressure / self.floor, 1.0) ** (1.0 - 1.0 / self.power)

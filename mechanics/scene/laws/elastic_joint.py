@@ -373,7 +373,7 @@ class ElasticJoint(Joint):
             displacement * (springs.pull + contacts.theta * springs.across * displacement),
         )
         most = np.maximum(energy + work, 0.0)
-        limited = ((begin > 0) & ~_holds(state)) | soft | (closure.power > 1.0)
+        limited = ((begin > 0) & ~_holds(state)) | soft | (not closure.linear)
         end = np.where(limited & (end < 0), np.maximum(end, -closure.at_energy(most)), end)
         drawn = np.sqrt(2.0 * most / self._tensile(contacts, state))
         end = np.where(soft & (end > 0), np.minimum(end, drawn), end)
@@ -385,7 +385,7 @@ class ElasticJoint(Joint):
 
     def _restiffened(self, contacts: Approach, springs: _Springs, across: Array) -> Array:
         """Return the factor (n,) on stretches along joints whose stiffness has changed: they keep force, or energy."""
-        if self.stiffening == 0:
+        if self._closure(contacts).linear:
             return np.ones(len(across))
         ratio = springs.along / self._along(contacts, across)
         return np.minimum(ratio, np.sqrt(ratio))

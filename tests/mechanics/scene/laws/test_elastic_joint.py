@@ -1,11 +1,12 @@
 """Joints with stiffness: what their springs hold while areas change, joints close, open, slide, crush and soften."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from ground.errors import SceneError
+from mechanics.scene.laws.closure import Closure
 from mechanics.scene.laws.elastic_joint import ElasticJoint
 from mechanics.scene.laws.law import BOND, CRUSHED, ENERGY, REST, SPRING, STATE
 from tests.mechanics.scene.laws.driven import Driven
@@ -253,3 +254,45 @@ def test_a_bond_whose_springs_hold_more_than_it_costs_breaks_at_its_strength():
     force = joint.path(np.linspace(0, 2e-3, 401)[1:])
     assert force.max() == pytest.approx(3e5, rel=0.01)
     assert (force[203:] == 0).all()
+
+
+@dataclass(frozen=True)
+class Hyperbola(Closure):
+    """p = k y/(1 - y/V), as Bandis, Lumsden & Barton (1983) measured it on joints of rock."""
+
+    most: float = 1e-3
+    linear = False
+
+    def pressure(self, closure):
+        return self.stiffness * closure / (1.0 - closure / self.most)
+
+    def tangent(self, closure):
+        return self.stiffness / (1.0 - closure / self.most) ** 2
+
+    def energy(self, closure):
+        share = closure / self.most
+        return -self.stiffness * self.most**2 * (share + np.log1p(-share))
+
+    def at_energy(self, energy):
+        known = np.linspace(0.0, 0.999 * self.most, 10_001)
+        return np.interp(energy, self.energy(known), known)
+
+    def stiffer(self, pressure):
+        return 1.0 + pressure / (self.stiffness * self.most)
+
+
+class ClosingJoint(ElasticJoint):
+    def _closure(self, contacts):
+        return Hyperbola(self._stiff(contacts)[0])
+
+
+def test_a_closure_of_another_shape_takes_one_class():
+    joint = Driven(ClosingJoint(0.5, 1e9, 5e8))
+    way = np.linspace(0, 8e-4, 801)
+    middle = 0.5 * (way[1:] + way[:-1])
+    expected = 1e9 * middle / (1.0 - middle / 1e-3)
+    np.testing.assert_allclose(-joint.path(-way[1:])[20:], expected[20:], rtol=1e-3)
+    np.testing.assert_allclose(-joint.path(-way[::-1][1:])[:-20], expected[::-1][:-20], rtol=1e-3)
+    # what it took it gave back, but for the steps
+    assert -1e-3 * expected.sum() * (way[1] - way[0]) < joint.work <= 0.0
+    assert joint.held == 0.0
