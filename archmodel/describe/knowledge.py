@@ -56,19 +56,20 @@ def owners_of(session: Session, members: Iterable[Membership]) -> list[Owner]:
     """List the structures to which a stone belongs, nearest first, each once."""
     owners: dict[int, Owner] = {}
     for membership in members:
-        _ascend(session, membership.structure_id, 1, owners)
+        _ascend(session, membership.structure_id, owners)
     return sorted(owners.values(), key=lambda owner: owner.distance)
 
 
 def owners_of_structure(session: Session, parent: int | None) -> list[Owner]:
     """List the structures of which a structure is a part, nearest first."""
     owners: dict[int, Owner] = {}
-    _ascend(session, parent, 1, owners)
+    _ascend(session, parent, owners)
     return list(owners.values())
 
 
-def _ascend(session: Session, number: int | None, distance: int, owners: dict[int, Owner]) -> None:
+def _ascend(session: Session, number: int | None, owners: dict[int, Owner]) -> None:
     """Add a structure and the structures that contain it; entries at no greater distance stay."""
+    distance = 1
     while number is not None and (number not in owners or owners[number].distance > distance):
         structure = session.get_one(Structure, number)
         owners[number] = Owner(structure, distance)
@@ -78,7 +79,7 @@ def _ascend(session: Session, number: int | None, distance: int, owners: dict[in
 def ancestors(session: Session, number: int) -> dict[int, str]:
     """Return the codes of a structure and of those that contain it, by number."""
     owners: dict[int, Owner] = {}
-    _ascend(session, number, 1, owners)
+    _ascend(session, number, owners)
     return {key: owner.structure.code for key, owner in owners.items()}
 
 

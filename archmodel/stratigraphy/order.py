@@ -55,10 +55,6 @@ class Order:
     beside: tuple[Link, ...]
     redundant: int
 
-    def is_later(self, unit: str, target: str) -> bool:
-        """Return whether a chain of relations leads from a unit, the later, to another."""
-        return bool(self.earlier[unit] >> self.units.index(target) & 1)
-
     def chain(self, unit: str, target: str) -> tuple[str, ...]:
         """Return the shortest chain of the reduction from a unit to an earlier one; () without any."""
         return _path(self.below, unit, target)

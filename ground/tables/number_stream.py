@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import SurveyError
-from ground.tables.columns import COORDINATES, LONGEST_HEAD, places_of
+from ground.tables.columns import LONGEST_HEAD, places_of
 from ground.tables.numbers import is_number, unreadable
 
 _NUMBER = re.compile(r"\s*\"?[-+]?[\d.]")
@@ -113,16 +113,13 @@ class NumberStream:
         return SurveyError("lines that are no points", where=f"{self.path}:{before + 1}", remedy=remedy)
 
 
-def open_numbers(
-    path: Path, wanted: Mapping[str, Sequence[str]] = COORDINATES, least: int = 3
-) -> NumberStream:
+def open_numbers(path: Path, wanted: Mapping[str, Sequence[str]]) -> NumberStream:
     """Open a large table of numbers.
 
     Parameters
     ----------
     path : of the file
     wanted : names of columns by what they are
-    least : numbers of a row, at least
 
     Raises
     ------
@@ -145,7 +142,7 @@ def open_numbers(
         if names and {*"xyz"} <= set(places):
             starts = all(_is_float(cells[places[axis]], commas) for axis in "xyz")
         if starts:
-            if len([cell for cell in cells if _is_float(cell, commas)]) < least:
+            if len([cell for cell in cells if _is_float(cell, commas)]) < len("xyz"):
                 break
             _check(path, head, titles, names, places)
             even = all(_is_float(cell, commas) for cell in cells) and not line.rstrip().endswith(

@@ -57,7 +57,6 @@ class JointResult:
     area : (nj,) [m²]
     sliver : (nj,) its area is not above `mechanics.results.joints.SLIVER` of the faces of its stones: its force counts,
         its pressure, eccentricity and kern say nothing of the masonry
-    second_moment : (nj, 2) ∫ y₁² and ∫ y₂² along t1 and t2 about the centroid [m⁴]
     force : (nj, 3) resultant on the first stone, world axes [N]
     moment : (nj, 3) about the centroid [N m]
     centre_of_pressure : (nj, 3) intersection of the resultant with the joint; NaN without compression [m]
@@ -82,7 +81,6 @@ class JointResult:
     centroid: Array
     area: Array
     sliver: Bools
-    second_moment: Array
     force: Array
     moment: Array
     centre_of_pressure: Array

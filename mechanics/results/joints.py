@@ -143,7 +143,6 @@ def joint_results(
         centroid=section.centroid,
         area=section.area,
         sliver=section.area <= SLIVER * largest_faces(model)[bodies].min(axis=1, initial=np.inf),
-        second_moment=section.moment,
         force=force,
         moment=moment,
         centre_of_pressure=section.centroid + np.einsum("jd,jdi->ji", place, section.frame[:, 1:]),

@@ -107,7 +107,6 @@ class ProposalReport:
 def propose_stones(
     url: str,
     where: Sequence[str] = (),
-    settings: MissingSettings | None = None,
     recording: Recording | None = None,
 ) -> ProposalReport:
     """Propose the stones that are missing in the survey.
@@ -116,10 +115,9 @@ def propose_stones(
     ----------
     url : of the database
     where : expressions; only stones between two that satisfy all of them are proposed
-    settings : limits of holes and openings
     recording : record the proposals; None: change nothing
     """
-    settings = settings or MissingSettings()
+    settings = MissingSettings()
     with (
         open_database(url, create=False) as database,
         database.session(read_only=recording is None) as session,

@@ -280,7 +280,7 @@ def _is_own(connection: sqlite3.Connection, layer: str) -> bool:
 
 
 def record_attribute_list(
-    session: Session, entry: Entry, listed: AttributeList, remark: Remark = PLAIN, again: bool = False
+    session: Session, entry: Entry, listed: AttributeList, again: bool = False
 ) -> dict[str, RowCounts]:
     """Record what a table or layer states; phases and materials that are new get their names only.
 
@@ -322,7 +322,7 @@ def record_attribute_list(
             about = subjects_of(things[code] for code in named)
             if again:
                 about = without_replaced(session, _STATED[what], about, entry.author)
-            counts += _say(session, entry, what, value, about, remark)
+            counts += _say(session, entry, what, value, about)
         outcome[what] = counts
     return outcome
 
@@ -341,15 +341,15 @@ def _declare(session: Session, entry: Entry, what: str, value: str) -> RowCounts
     return NOTHING
 
 
-def _say(session: Session, entry: Entry, what: str, value: str, about: Subjects, remark: Remark) -> RowCounts:
+def _say(session: Session, entry: Entry, what: str, value: str, about: Subjects) -> RowCounts:
     match what:
         case "phase":
-            return say_of_phase(session, entry, about, value, remark)
+            return say_of_phase(session, entry, about, value, PLAIN)
         case "material":
-            return say_made_of(session, entry, about, value, remark)
+            return say_made_of(session, entry, about, value, PLAIN)
         case "mark":
-            return say_mason_mark(session, entry, about, value, remark=remark)
+            return say_mason_mark(session, entry, about, value, remark=PLAIN)
         case "observation":
-            return say_observation(session, entry, about, value, remark=remark)
+            return say_observation(session, entry, about, value, remark=PLAIN)
         case _:
-            return say_note(session, entry, about, "remark", Remark(text=value, stated_on=remark.stated_on))
+            return say_note(session, entry, about, "remark", Remark(text=value))

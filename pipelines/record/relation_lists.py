@@ -183,9 +183,7 @@ def _relation(row: TableRow, column: int, where: str) -> str:
     return name
 
 
-def record_relation_list(
-    session: Session, entry: Entry, listed: RelationList, remark: Remark = PLAIN
-) -> dict[str, RowCounts]:
+def record_relation_list(session: Session, entry: Entry, listed: RelationList) -> dict[str, RowCounts]:
     """Record the relations of a list; units that are neither stones nor structures become stratigraphic units.
 
     Returns
@@ -210,11 +208,11 @@ def record_relation_list(
             raise UsageError(f"{unit} is {relation} itself", where=where, remedy="name two units")
     relations = [(things[unit], relation, things[target]) for _, unit, relation, target in listed.relations]
     try:
-        outcome["stratigraphy"] = say_stratigraphy(session, entry, relations, remark)
+        outcome["stratigraphy"] = say_stratigraphy(session, entry, relations, PLAIN)
     except UsageError as error:
         raise _at_lines(listed, error) from None
     outcome |= _record_notes(session, entry, listed, things)
-    return outcome | _record_epochs(session, entry, listed, things, remark)
+    return outcome | _record_epochs(session, entry, listed, things)
 
 
 def _without_known(session: Session, listed: RelationList) -> RelationList:
@@ -254,7 +252,7 @@ def _record_notes(
 
 
 def _record_epochs(
-    session: Session, entry: Entry, listed: RelationList, things: Mapping[str, Thing], remark: Remark
+    session: Session, entry: Entry, listed: RelationList, things: Mapping[str, Thing]
 ) -> dict[str, RowCounts]:
     """Declare the epochs of a drawing as phases, and state them of its units."""
     outcome: dict[str, RowCounts] = {}
@@ -263,7 +261,7 @@ def _record_epochs(
         outcome["phase"] = outcome.get("phase", NOTHING) + declared
         units = [things[code] for code, unit in listed.drawn.items() if unit.epoch == epoch.phase]
         if units:
-            stated = say_of_phase(session, entry, subjects_of(units), epoch.phase, remark)
+            stated = say_of_phase(session, entry, subjects_of(units), epoch.phase, PLAIN)
             outcome["of_phase"] = outcome.get("of_phase", NOTHING) + stated
     return outcome
 

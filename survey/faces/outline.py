@@ -40,7 +40,6 @@ class OutlineMeasures:
     Attributes
     ----------
     area : [m²]
-    perimeter : [m]
     length, height : extents along the level direction of the face and perpendicular to it [m]; of a level face,
         the larger and the smaller principal extent
     skew : difference of the angle between the two middle lines of a face of four corners from a right angle, its
@@ -48,7 +47,6 @@ class OutlineMeasures:
     """
 
     area: float
-    perimeter: float
     length: float
     height: float
     skew: float | None
@@ -125,7 +123,6 @@ def measure_outline(flat: Array, level: Array | None) -> OutlineMeasures:
         length, height = height, length
     return OutlineMeasures(
         area=_signed_area(points),
-        perimeter=sum(map(math.dist, points, points[1:] + points[:1])),
         length=length,
         height=height,
         skew=_skew(points) if len(points) == 4 else None,

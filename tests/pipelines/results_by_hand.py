@@ -122,7 +122,6 @@ def joints_of(pairs, forces, heights):
         centroid=centroid,
         area=np.ones(count),
         sliver=np.zeros(count, dtype=bool),
-        second_moment=np.full((count, 2), 1.0 / 12.0),
         force=-np.array(forces, dtype=float).reshape(-1, 3),
         moment=np.column_stack([np.zeros(count), normal * away, np.zeros(count)]),
         centre_of_pressure=centroid + np.column_stack([away, np.zeros((count, 2))]),

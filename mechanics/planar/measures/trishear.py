@@ -79,13 +79,11 @@ class TrishearFit:
     model : with the half angle and ratio of least squares
     residual : root mean square distance between both motions [m]
     relative : residual over the slip [-]
-    explained : 1 - Σ residual² / Σ displacement² [-]
     """
 
     model: Trishear
     residual: float
     relative: float
-    explained: float
 
 
 def trishear_fit(
@@ -117,7 +115,5 @@ def trishear_fit(
         if best is None or fit.cost < best.cost:
             best = fit
     assert best is not None
-    unexplained, whole = float(np.sum(misfit(best.x) ** 2)), float(np.sum((moved - place) ** 2))
-    residual = float(np.sqrt(unexplained / len(place)))
-    explained = 1.0 - unexplained / whole if whole > 0 else float("nan")
-    return TrishearFit(Trishear(tip, dip, *map(float, best.x)), residual, residual / abs(slip), explained)
+    residual = float(np.sqrt(np.sum(misfit(best.x) ** 2) / len(place)))
+    return TrishearFit(Trishear(tip, dip, *map(float, best.x)), residual, residual / abs(slip))

@@ -29,15 +29,15 @@ from pipelines.assess.study.settings import Method, StudyTable
 from pipelines.assess.workers.store import Sample
 
 
-def monte_carlo(count: int, dimension: int, seed: int, stage: int = 0) -> Array:
-    """Return independent points (count, dimension); each follows from the seed, the stage and its number alone.
+def monte_carlo(count: int, dimension: int, seed: int) -> Array:
+    """Return independent points (count, dimension); each follows from the seed and its number alone.
 
     >>> bool((monte_carlo(5, 2, 1)[:3] == monte_carlo(3, 2, 1)).all())
     True
     """
     points = np.empty((count, dimension))
     for number in range(count):
-        points[number] = np.random.default_rng([seed, stage, number]).standard_normal(dimension)
+        points[number] = np.random.default_rng([seed, 0, number]).standard_normal(dimension)
     return points
 
 

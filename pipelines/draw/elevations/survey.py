@@ -1,6 +1,7 @@
 """Pictures of a survey report: elevations and residuals."""
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -180,7 +181,7 @@ def draw_residuals(path: Path, residuals: Histogram, verdict: str) -> None:
     axes.plot(fine, normal, color=FLAG, linewidth=2.0, label="expected, if the stated sigma is right")
     axes.set_xlabel("residual over its own standard deviation [-]; the end bars hold all beyond")
     axes.set_ylabel("points and corners")
-    axes.set_title("\n".join(_wrapped(verdict, 90)), fontsize=10, color=INK, parse_math=False)
+    axes.set_title("\n".join(textwrap.wrap(verdict, 90)), fontsize=10, color=INK, parse_math=False)
     axes.legend(frameon=False, loc="upper left")
     axes.spines[["top", "right"]].set_visible(False)
     save_sheet(figure, path)
@@ -208,9 +209,3 @@ def _legend(axes: "Axes", marked: bool, unknown: bool) -> None:
         )
     if keys:
         axes.figure.legend(handles=keys, loc="outside lower left", ncols=2, frameon=False, fontsize=9)
-
-
-def _wrapped(text: str, width: int) -> list[str]:
-    import textwrap
-
-    return textwrap.wrap(text, width)

@@ -50,9 +50,9 @@ def languages_packed() -> Markup:
     return Markup(base64.b64encode(gzip.compress(text, 9, mtime=0)).decode("ascii"))
 
 
-def viewer_html(model: Model, number: int = 1) -> Markup:
-    """Return the element of a viewer and its data; the first of a page keeps the link to its view."""
-    return _html(pack(model), number)
+def viewer_html(model: Model) -> Markup:
+    """Return the element of a viewer and its data."""
+    return again([pack(model)])
 
 
 def _html(packed: str, number: int) -> Markup:

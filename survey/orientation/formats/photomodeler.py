@@ -238,7 +238,7 @@ def _smart_points(numbers: list[int], marks: list[tuple[int, Array]]) -> tuple[i
     return max(numbers[: falls[0]]) + 1 - min(numbers[falls[0] :]), falls[0]
 
 
-def write_photomodeler(network: Network, path: Path, title: str = "moma") -> None:
+def write_photomodeler(network: Network, path: Path) -> None:
     """Write a network in this format, with all digits.
 
     Points are numbers in this format. Where one has another name, all are numbered, and NAME-points.txt beside the file
@@ -277,7 +277,7 @@ def write_photomodeler(network: Network, path: Path, title: str = "moma") -> Non
         return [*inner[:3], camera.pixel * camera.size[0], camera.pixel * camera.size[1], *inner[5:]]
 
     none = row(np.zeros(10))
-    text = [title, f"0.0005 20 {camera.size[0]} {camera.size[1]}", row(np.ones(9)), row(of(camera)), none]
+    text = ["moma", f"0.0005 20 {camera.size[0]} {camera.size[1]}", row(np.ones(9)), row(of(camera)), none]
     for k, photo in enumerate(network.photos):
         orientation = np.zeros(6)
         if photo.rotation is not None and photo.station is not None:

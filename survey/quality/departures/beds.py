@@ -290,15 +290,15 @@ def find_bed_movements(
 
 
 def measure_beds(
-    stones: Sequence[StoneQuality], facades: Iterable[Facade], tilts: Sequence[Array] = ()
+    stones: Sequence[StoneQuality], facades: Iterable[Facade]
 ) -> tuple[tuple[CourseLine, ...], tuple[WallBeds, ...]]:
     """Return the bed lines of a survey and the movements of its walls, both with one scatter of beds.
 
     Parameters
     ----------
-    stones, facades, tilts : as of `measure_courses`
+    stones, facades : as of `measure_courses`
     """
-    lines = measure_courses(stones, facades, tilts)
+    lines = measure_courses(stones, facades)
     lengths, rows = (
         {stone.code: stone.length for stone in stones},
         {stone.code: stone.line for stone in stones},

@@ -47,7 +47,6 @@ def test_the_fit_finds_angle_and_ratio_again(half, ratio):
     assert fit.model.ratio == pytest.approx(ratio, abs=0.1)
     # noise of 1.4 cm, and a few places that the tip just passes or just does not
     assert fit.residual < 0.1
-    assert fit.explained > 0.99
 
 
 def test_a_rigid_block_is_explained_badly():
