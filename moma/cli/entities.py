@@ -85,16 +85,16 @@ def query(
         from archmodel.database.session import open_database
         from moma.cli.text.query import Question, answer, listed
 
-        if common.json and shown.format not in (None, ListFormat.JSON):
+        if common.json and shown.format not in (None, "json"):
             raise UsageError(
                 f"--json and --format {shown.format} request two formats", remedy="give one of them"
             )
-        wanted = ListFormat.JSON if common.json else shown.format or ListFormat.TABLE
-        if shown.excel and (common.json or shown.format not in (None, ListFormat.CSV)):
+        wanted = "json" if common.json else shown.format or "table"
+        if shown.excel and (common.json or shown.format not in (None, "csv")):
             raise UsageError("--excel is CSV for spreadsheets", remedy="leave out the other format")
         if (shown.share_of or shown.only_in) and shown.count_by is None:
             raise UsageError("--share-of and --only-in need --count-by", remedy="give --count-by phase, say")
-        if shown.flat and wanted is not ListFormat.GEOJSON:
+        if shown.flat and wanted != "geojson":
             raise UsageError("--flat is for faces", remedy="give --format geojson too")
         question = Question(
             kind,

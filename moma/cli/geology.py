@@ -1,8 +1,7 @@
 """Command that runs geological scenes."""
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -10,16 +9,8 @@ from moma.cli.console import reporting, say
 from moma.cli.options import Json, Out, Overwrite, Resume, SceneArgument, StoreDb
 from moma.cli.progress import Interruption, progress_bars
 
-
-class ExperimentName(StrEnum):
-    """Experiments with disks."""
-
-    DEPOSIT = "deposit"
-    FOLD = "fold"
-    FAULT = "fault"
-    BIAXIAL = "biaxial"
-    WEDGE = "wedge"
-    REPOSE = "repose"
+ExperimentName = Literal["deposit", "fold", "fault", "biaxial", "wedge", "repose"]
+"""Experiments with disks."""
 
 
 @reporting
@@ -48,7 +39,7 @@ def geology(
     with progress_bars() as listener, stop.handled():
         done = run_geology(
             scene,
-            experiment.value,
+            experiment,
             folder,
             samples,
             stop.listening(listener),

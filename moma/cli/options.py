@@ -1,9 +1,8 @@
 """Options and arguments shared by several commands; a command takes a group of them as one dataclass."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -27,42 +26,20 @@ def check_ending(file: Path | None, *endings: str) -> None:
         )
 
 
-class SurveyFormat(StrEnum):
-    """Formats of survey files."""
-
-    MOMA = "moma"
-    CSV = "csv"
-    PNEZD = "pnezd"
-    PENZD = "penzd"
-    GSI = "gsi"
-    JOBXML = "jobxml"
-    LANDXML = "landxml"
-    GEOJSON = "geojson"
-    SOLIDS = "solids"
+SurveyFormat = Literal["moma", "csv", "pnezd", "penzd", "gsi", "jobxml", "landxml", "geojson", "solids"]
+"""Formats of survey files."""
 
 
-class UpAxis(StrEnum):
-    """Axes that may point upwards."""
-
-    Y = "y"
-    Z = "z"
+UpAxis = Literal["y", "z"]
+"""Axes that may point upwards."""
 
 
-class ListFormat(StrEnum):
-    """Formats of a list of entities."""
-
-    TABLE = "table"
-    CSV = "csv"
-    JSON = "json"
-    GEOJSON = "geojson"
+ListFormat = Literal["table", "csv", "json", "geojson"]
+"""Formats of a list of entities."""
 
 
-class ProfileName(StrEnum):
-    """Names in pipelines.tuning.profiles, which is not loaded for a help text."""
-
-    FAST = "fast"
-    BALANCED = "balanced"
-    ACCURATE = "accurate"
+ProfileName = Literal["fast", "balanced", "accurate"]
+"""Names in pipelines.tuning.profiles, which is not loaded for a help text."""
 
 
 Db = Annotated[

@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,18 +16,12 @@ if TYPE_CHECKING:
     from pipelines.propose.propose import ProposalReport
 
 
-class Subject(StrEnum):
-    """Subjects of proposals."""
-
-    MISSING = "missing"
-    INFILL = "infill"
+Subject = Literal["missing", "infill"]
+"""Subjects of proposals."""
 
 
-class CoreShape(StrEnum):
-    """Shapes of the core of a wall."""
-
-    BLOCKS = "blocks"
-    STOREYS = "storeys"
+CoreShape = Literal["blocks", "storeys"]
+"""Shapes of the core of a wall."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +78,10 @@ def propose(
     options = {"--as": core.shape, "--storey-height": core.storey_height, "--facings": core.facings}
     _refuse_others(what, options, core.shape, record, author, source)
     recording = Recording(author, source) if record else None
-    if what is Subject.MISSING:
+    if what == "missing":
         report = propose_stones(common.db, where or (), recording=recording)
     else:
-        settings = InfillSettings(
-            shape=InfillShape(core.shape or CoreShape.BLOCKS), storey_height=core.storey_height
-        )
+        settings = InfillSettings(shape=InfillShape(core.shape or "blocks"), storey_height=core.storey_height)
         report = propose_core(common.db, where or (), settings, recording, facings=core.facings)
     if common.json:
         print(as_json(asdict(report)))
@@ -112,12 +103,12 @@ def _refuse_others(
     source: str | None,
 ) -> None:
     """Refuse options that exclude each other."""
-    if what is Subject.MISSING:
+    if what == "missing":
         for name, value in options.items():
             if value is not None:
                 raise UsageError(f"{name} is for the core of walls", remedy="leave it out, or propose infill")
     height = options["--storey-height"]
-    if height is not None and shape is not CoreShape.STOREYS:
+    if height is not None and shape != "storeys":
         raise UsageError("--storey-height is for storeys", remedy="give --as storeys too")
     if isinstance(height, float) and not height > 0.0:
         raise UsageError(f"--storey-height is {height:g} m", remedy="give a height above zero")
@@ -153,14 +144,8 @@ def _summary(report: "ProposalReport", record: bool) -> str:
     return text if report.related is None else f"{text}, relations recomputed as entry {report.related}"
 
 
-class MasonryKind(StrEnum):
-    """Kinds of masonry in a picture."""
-
-    AUTO = "auto"
-    ASHLAR = "ashlar"
-    COURSED = "coursed"
-    BRICK = "brick"
-    RUBBLE = "rubble"
+MasonryKind = Literal["auto", "ashlar", "coursed", "brick", "rubble"]
+"""Kinds of masonry in a picture."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +180,7 @@ class _PictureChoices:
         float | None,
         typer.Option("--joint", metavar="T", help="Width of the joints in metres; default: by itself."),
     ] = None
-    masonry: Annotated[MasonryKind, typer.Option(help="Kind of masonry.")] = MasonryKind.AUTO
+    masonry: Annotated[MasonryKind, typer.Option(help="Kind of masonry.")] = "auto"
     review: Annotated[
         Path | None,
         typer.Option(
@@ -235,7 +220,7 @@ def outlines(
         asked.mask,
         asked.depth_map,
         asked.joint,
-        asked.masonry.value,
+        asked.masonry,
         asked.review,
         asked.corrected,
     )

@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -27,27 +26,16 @@ if TYPE_CHECKING:
     from survey.formats.options import ReadingOptions
 
 
-class Level(StrEnum):
-    """Grades of what a survey does not tell about masonry."""
-
-    GOOD = "good"
-    MEDIUM = "medium"
-    POOR = "poor"
+Level = Literal["good", "medium", "poor"]
+"""Grades of what a survey does not tell about masonry."""
 
 
-class Moved(StrEnum):
-    """Causes of movement of samples."""
-
-    SETTLEMENT = "settlement"
-    THRUST = "thrust"
-    EARTHQUAKE = "earthquake"
+Moved = Literal["settlement", "thrust", "earthquake"]
+"""Causes of movement of samples."""
 
 
-class Blunders(StrEnum):
-    """Treatment of marks that the test finds wrong."""
-
-    REPORT = "report"
-    REMOVE = "remove"
+Blunders = Literal["report", "remove"]
+"""Treatment of marks that the test finds wrong."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +173,7 @@ def orient(
             _names(export.calibrate),
             export.fixed_control,
             _names(export.check),
-            (export.blunders or Blunders.REPORT).value,
+            export.blunders or "report",
             None if export.size is None else _pixels(export.size),
         )
     folder = out or Path("out") / (project or export.photomodeler or Path("photographs")).stem
@@ -321,7 +309,7 @@ def survey_report(
     name, paths, options = sources(survey, drawn)
     folder = out or Path("out") / f"survey-{(drawn.outlines or paths[0]).resolve().stem}"
     levels = {"MM": masonry.mortar, "SM": masonry.state}
-    given = {name: given_grade(level.value) for name, level in levels.items() if level is not None}
+    given = {name: given_grade(level) for name, level in levels.items() if level is not None}
     with progress_bars() as listener:
         report = report_surveys(
             paths, folder, name, options, listener, given, overwrite, orthophoto, since or ()
@@ -407,7 +395,7 @@ def sources(
     choices = {name: value for name, value in vars(survey).items() if name not in ("files", "format")}
     options = reading_options(**choices)
     if solids is not None:
-        up = None if solids.up is None else solids.up.value
+        up = solids.up
         options = solid_options(options, up, solids.repair, solids.snap, solids.planes)
         choices |= {"up": up, "repair": solids.repair, "snap": solids.snap, "planes": solids.planes}
     if (outlines := _outlined(options, survey, drawn)) is not None:
@@ -415,7 +403,7 @@ def sources(
         return outlines
     if not survey.files:
         raise UsageError("no survey file", remedy="name at least one")
-    name = survey.format.value if survey.format else format_of_all(survey.files)
+    name = survey.format or format_of_all(survey.files)
     _check_fitting(name, choices)
     return name, survey.files, options
 

@@ -34,7 +34,7 @@ def database(tmp_path_factory):
 
 
 def test_the_formats_that_can_be_named_are_those_that_are_read():
-    assert [one.value for one in SurveyFormat] == list(FORMATS)
+    assert [*get_args(SurveyFormat)] == list(FORMATS)
 
 
 @dataclass(frozen=True)

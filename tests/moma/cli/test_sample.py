@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from typing import get_args
 
 import pytest
 
@@ -30,7 +31,7 @@ def test_the_help_names_the_samples_and_the_causes_of_movement():
     names = [name for name in sample_names() if " " not in name]
     assert f"{', '.join(names[:-1])} or {names[-1]}." in said
     causes = {name.split()[name.split().index("--moved") + 1] for name in sample_names() if "--moved" in name}
-    assert causes == {one.value for one in Moved}
+    assert causes == {*get_args(Moved)}
 
 
 def test_samples_and_options_that_there_are_not_are_refused(tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -101,7 +102,7 @@ def test_without_a_name_a_scene_stays_as_it_is_and_a_wrong_name_is_refused():
 
 def test_profiles_become_finer_one_by_one():
     fast, balanced, accurate = PROFILES.values()
-    assert list(PROFILES) == ["fast", "balanced", "accurate"] == [one.value for one in ProfileName]
+    assert list(PROFILES) == ["fast", "balanced", "accurate"] == [*get_args(ProfileName)]
     assert fast.rest.tolerance > balanced.rest.tolerance > accurate.rest.tolerance
     assert fast.rest.step > balanced.rest.step > accurate.rest.step
     assert fast.step > balanced.step > accurate.step
