@@ -9,9 +9,12 @@ from hypothesis import strategies as st
 
 from mechanics.contact.contacts import NODE, material_points
 from mechanics.contact.mortar_contacts import mortar_contacts
+from mechanics.scene.scene import Fidelity
 from mechanics.scene.state import State
+from mechanics.stones.meshing.elements import Element
 from tests.mechanics.contact.box_faces import BOTTOM, KINDS, TOP, nodes_of, two_boxes
 from tests.mechanics.contact.polygons import moments, overlap
+from tests.mechanics.shapes import brick, detected, scene
 
 LOWER = ((0.0, 0.0, -0.5), (1.0, 0.7, 0.0))
 PAIRS = [(9, 6), (8, 3), (4, 8), (6, 9), (3, 4), (6, None), (4, None), (9, None)]
@@ -239,3 +242,24 @@ def test_two_faces_just_as_fine_have_one_candidate_whatever_their_order(swap):
     finer, placed, nodes = two_boxes(lower, upper, (4, 3, 3, 0.0), mesh)
     found, _ = mortar_contacts(finer, placed, pair, face, np.array([0]), np.array([1.0]), len(nodes), 1e-6)
     assert (found.bodies == [0, 1]).all()
+
+
+SOFT = Fidelity.DEFORMABLE
+
+
+@pytest.mark.parametrize("element", [Element.HEX8, Element.TET4, Element.TET10])
+@pytest.mark.parametrize("off", [0.0, 1.4e-17, -1.4e-17, 4.2e-17, 1e-15, -1e-15, 1e-13, -1e-13])
+def test_rounding_makes_no_points_without_area(element, off):
+    """Each point carries a part of the bed that is a part of a facet, and all of them the whole bed."""
+    seam = -0.1 + off
+    lower = [
+        brick("left", (-0.3, -0.25, 0.0), (seam, 0.25, 0.3), SOFT, mesh_size=0.3, element=element),
+        brick("right", (seam, -0.25, 0.0), (0.3, 0.25, 0.3), SOFT, mesh_size=0.21, element=element),
+    ]
+    upper = brick("upper", (-0.3, -0.25, 0.3), (0.3, 0.25, 0.6), SOFT, mesh_size=0.2, element=element)
+    _, _, contacts = detected(scene(*lower, upper))
+    pairs = np.sort(contacts.bodies, axis=1)
+    for first, width in ((0, 0.2), (1, 0.4)):
+        area = contacts.area[(pairs == (first, 2)).all(axis=1)]
+        assert area.sum() == pytest.approx(width * 0.5, rel=1e-9)
+        assert area.min() > 1e-4

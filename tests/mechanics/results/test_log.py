@@ -1,5 +1,7 @@
-"""What the record of a run counts: the last five steps, and stones that may move."""
+"""Record of a run: what it counts, of the last five steps and stones that may move, and the memory it takes."""
 
+import gc
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -33,3 +35,28 @@ def test_a_support_that_sinks_is_no_stone_that_settles():
     result = simulate(replace(one, loads=Loads(motions=(settlement(["sinking"], (0, 0, -0.02), 0.05),))))
     assert result.bodies[1].displacement[:, 2] == pytest.approx(-0.02)
     assert np.abs(result.history.settlement).max() < 1e-5
+
+
+PER_STEP = 450
+"""Bytes: nine numbers of the history, each an object of 24 bytes in a tuple, take 350 with their row."""
+
+
+@pytest.mark.slow
+def test_a_step_adds_its_row_of_the_history_and_no_more():
+    """From the 500th of 2,000 steps on, when memories that save time are full."""
+    cube = brick("cube", (0, 0, 0), (0.5, 0.5, 0.5))
+    one = scene(ground(), cube, step=1e-3, duration=2.0, stop_at_equilibrium=False)
+    sizes = {}
+
+    def listen(progress):
+        if progress.stage == "step" and progress.done in (500, 1900):
+            gc.collect()
+            sizes[progress.done] = tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        simulate(one, listen)
+    finally:
+        tracemalloc.stop()
+    grown = (sizes[1900] - sizes[500]) / 1400
+    assert grown < PER_STEP

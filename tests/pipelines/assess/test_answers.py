@@ -1,4 +1,4 @@
-"""Answers of an assessment: the caution beside a number, and which of two candidates a code checks."""
+"""Answers of an assessment: cautions, which of two candidates a code checks, runs that decide nothing."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from mechanics.limit.held import HeldLimit
 from mechanics.limit.limit_load import Flow, limit_load
 from mechanics.limit.live_loads import Acceleration
 from pipelines.assess import answers
-from pipelines.assess.answers import answer
+from pipelines.assess.answers import _confirmed, answer
 from pipelines.assess.assess import _title
 from pipelines.assess.questions import LoadQuestion
 from pipelines.scene.site import Site
@@ -121,3 +121,21 @@ def test_what_slides_is_told_without_friction_across_its_way(monkeypatch, share,
 def test_what_turns_is_not_asked_for_a_line_of_sliding(on, monkeypatch):
     monkeypatch.setattr(answers, "without_friction_across", lambda *_: pytest.fail("it tips"))
     assert asked(on, monkeypatch, lambda one: one)["without_friction_across"] is None
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "count"),
+    [
+        ((), 0),
+        ((Outcome.EQUILIBRIUM, Outcome.SETTLED), 0),
+        ((Outcome.EQUILIBRIUM, Outcome.MOVING), 1),
+        ((Outcome.MOVING, Outcome.INTERRUPTED, Outcome.EQUILIBRIUM), 2),
+    ],
+)
+def test_runs_that_still_move_decide_nothing(outcomes, count):
+    trials = tuple(ConfirmationRun(0.1, outcome, 10, 0, np.zeros((2, 3))) for outcome in outcomes)
+    found = Confirmation(0.1, np.inf, trials)
+    told = _confirmed(None, found, type("Candidate", (), {"multiplier": 0.1}))
+    assert told["undecided"] == count
+    assert [run["outcome"] for run in told["runs"]] == [str(outcome) for outcome in outcomes]
+    assert (told["held"], told["lost"], told["likeness"]) == (0.1, None, None)

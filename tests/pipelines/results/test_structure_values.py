@@ -1,4 +1,4 @@
-"""Results of structures by hand: of joints that open by known widths, in the summary, the report and the page."""
+"""Results of stones and structures by hand: of joints that open, in the summary, the report and the page."""
 
 import re
 from dataclasses import replace
@@ -64,3 +64,29 @@ def test_the_crack_widths_are_in_the_summary_the_report_and_the_page(opened, tmp
     (column,) = (one for one in model.columns if one.name == "course_crack_width")
     assert (column.label, column.unit) == ("crack width of its course", "m")
     np.testing.assert_array_equal(column.values, [3e-4, 2e-3, 2e-3, np.nan])
+
+
+@pytest.fixture
+def tower():
+    """Four stones on top of each other, with three joints of kern 0.6, 1.2 and 1.8 under 3, 2 and 1 kN."""
+    bodies = [rigid_body(f"S{k}", (0, 0, k), (1, 1, k + 1)) for k in range(4)]
+    pairs, forces = ((1, 0), (2, 1), (3, 2)), ((0, 0, 3000.0), (0, 0, 2000.0), (0, 0, 1000.0))
+    return result_of(bodies, pairs=pairs, forces=forces)
+
+
+def values(result, name):
+    return [stone.values.get(name) for stone in stone_results(result)]
+
+
+def test_each_stone_has_the_worst_of_its_joints(tower):
+    assert values(tower, "joint_kern") == pytest.approx([0.6, 1.2, 1.8, 1.8])
+    assert values(tower, "joint_pressure") == pytest.approx([4500.0, 4500.0, 3000.0, 1500.0])
+    assert values(tower, "joint_sliding") == pytest.approx([1e-3, 2e-3, 3e-3, 3e-3])
+
+
+def test_pressure_and_kern_of_slivers_are_left_out_but_not_how_far_they_slid(tower):
+    joints = replace(tower.joints, sliver=np.array([False, False, True]))
+    found = replace(tower, joints=joints)
+    assert values(found, "joint_kern") == [pytest.approx(0.6), pytest.approx(1.2), pytest.approx(1.2), None]
+    assert values(found, "joint_pressure") == [4500.0, 4500.0, 3000.0, None]
+    assert values(found, "joint_sliding") == pytest.approx([1e-3, 2e-3, 3e-3, 3e-3])

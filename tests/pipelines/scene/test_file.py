@@ -15,6 +15,7 @@ from pipelines.scene.file import TABLES, parse_scene, read_scene
 from pipelines.scene.settings import Fidelities, MeshSettings, Output, Selection
 from survey.joints.settings import JointSettings
 from tests.paths import ROOT
+from tests.pipelines.scene.reference import with_tables
 from tests.pipelines.scenes import fails_at_line
 
 SAMPLE = ROOT / "data/samples/window/window.toml"
@@ -173,3 +174,21 @@ def test_every_setting_has_a_key_with_its_default(table, owners):
     assert keys == {name: value for name, value in settings.items() if name not in others} | (
         {"default": "auto"} if table == "bodies" else {}
     )
+
+
+PAGE = (ROOT / "docs/scene.md").read_text(encoding="utf-8")
+
+
+def test_the_tables_of_the_page_are_those_of_the_keys():
+    assert with_tables(PAGE) == PAGE
+
+
+def test_an_old_table_is_renewed():
+    old = PAGE.replace("| `step` | s | `0.001` | Time step h. |\n", "| `stride` | m | | Old. |\n")
+    assert old != PAGE
+    assert with_tables(old) == PAGE
+
+
+def test_a_table_that_is_missing_is_named():
+    with pytest.raises(LookupError, match=r"sections \[\[throw\]\]"):
+        with_tables(PAGE[: PAGE.index("## `[[throw]]`")])

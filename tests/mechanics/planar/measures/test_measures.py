@@ -1,4 +1,4 @@
-"""Stress, fabric, strain and shape of groups of disks, beside closed forms."""
+"""Stress, fabric, strain and shape of groups of disks, thrusts, and the critical taper, beside closed forms."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,9 @@ from mechanics.planar.measures.limits import crest_radius, shear_limits
 from mechanics.planar.measures.strain import deformation
 from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.surface import profile, slope
+from mechanics.planar.measures.taper import critical_slope
 from mechanics.planar.measures.tessellation import tessellation
+from mechanics.planar.measures.thrusts import thrusts_of
 
 MAP = np.array([[1.2, 0.4], [-0.1, 0.8]])
 
@@ -225,3 +227,56 @@ def test_debris_what_is_covered_and_what_stands_on_the_base_have_not_come_off():
     found = blocks_of(start, apart, np.full(72, 0.5), 0.02)
     assert found.size.tolist() == [24, 24, 21, 3]
     assert found.detached.tolist() == [2]
+
+
+X, Y = np.meshgrid(np.arange(0.0, 40.0, 0.2), np.arange(0.1, 2.0, 0.2))
+PLACES = np.column_stack([X.ravel(), Y.ravel()])
+RADII = np.full(len(PLACES), 0.1)
+
+
+def bands(places, dip):
+    """Shear that falls off from lines which start at the base and dip to the left."""
+    away = [PLACES[:, 0] - place - PLACES[:, 1] / np.tan(dip) for place in places]
+    return 0.01 + sum(np.exp(-((one * np.sin(dip) / 0.15) ** 2)) for one in away)
+
+
+def test_bands_are_found_with_their_spacing_and_dip():
+    found = thrusts_of(PLACES, PLACES, bands((8.0, 16.0, 24.0), np.radians(35.0)), RADII, 2.0)
+    assert found.place == pytest.approx(np.array([8.0, 16.0, 24.0]) + 1.0 / np.tan(np.radians(35.0)), abs=0.8)
+    assert found.spacing == pytest.approx(8.0, abs=0.3)
+    assert np.degrees(found.dip) == pytest.approx(35.0, abs=4.0)
+
+
+def test_without_a_layer_there_is_no_thrust():
+    found = thrusts_of(PLACES, PLACES, bands((8.0,), 0.6), RADII, 0.0)
+    assert len(found.place) == 0
+    assert np.isnan(found.spacing)
+
+
+def friction_on_base(internal, surface, base):
+    """tan φ_b on a plane below the surface of a wedge that fails: Mohr's circle through the stress at a given depth.
+
+    With z down from the surface, σ_zz = ρ g z cos α, τ = ρ g z sin α; of two circles at failure the larger one, which
+    is that of a wedge that is pushed.
+    """
+    normal, shear = np.cos(surface), np.sin(surface)
+    # (normal - p)² + shear² = (p sin φ)²
+    a, b, c = np.cos(internal) ** 2, -2.0 * normal, normal**2 + shear**2
+    p = (-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+    turn = 2.0 * (surface + base)
+    away = normal - p
+    on_base = p + away * np.cos(turn) + shear * np.sin(turn)
+    along = shear * np.cos(turn) - away * np.sin(turn)
+    return abs(along) / on_base
+
+
+@pytest.mark.parametrize(("internal", "basal", "base"), [(30, 10, 0), (30, 25, 0), (36, 16, 3), (20, 5, -1)])
+def test_the_base_of_a_critical_wedge_is_about_to_slide(internal, basal, base):
+    internal, basal, base = np.radians([internal, basal, base])
+    surface = critical_slope(internal, basal, base)
+    assert friction_on_base(internal, surface, base) == pytest.approx(np.tan(basal), rel=1e-9)
+
+
+def test_a_base_stronger_than_the_wedge_is_refused():
+    with pytest.raises(SceneError, match="basal"):
+        critical_slope(0.3, 0.4)

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -6,12 +7,17 @@ import pytest
 import trimesh
 
 from ground.errors import MomaError, SurveyError, UsageError
+from survey.formats.native.reader import read_head
+from survey.formats.native.writer import write_head
 from survey.formats.options import ReadingOptions
+from survey.formats.reading import open_survey
 from survey.formats.solids.msh.sections import MshFile
+from survey.formats.solids.obj_writer import write_obj
 from survey.formats.solids.reader import open_solids
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight, triangulate
 from survey.records.survey import Reject, SolidRecord
+from synthetic.buildings.ribs import RibVaultShape, rib_vault
 from tests.survey.formats.survey_files import EXAMPLES, SQUARES, moved
 
 SOLIDS = [name for name, one in EXAMPLES.items() if one.format == "solids"]
@@ -346,3 +352,25 @@ def test_a_mesh_that_names_what_is_not_there_is_refused(tmp_path: Path) -> None:
         with pytest.raises(SurveyError) as error:
             read(tmp_path / "a.msh", wrong)
         assert words in str(error.value), error.value
+
+
+def test_solids_are_read_back_to_the_last_bit(tmp_path):
+    vault = rib_vault(RibVaultShape(segments=4))
+    head = replace(vault.building.survey.head, name="ribs (synthetic)")
+    write_obj(vault.building.modelled, tmp_path / "ribs.obj")
+    write_head(head, tmp_path / "head.moma")
+    read = read_head(tmp_path / "head.moma")
+    assert read.name == "ribs (synthetic)"
+    np.testing.assert_array_equal(read.stations[0].position, head.stations[0].position)
+    assert [(rule.kind, rule.depth, rule.source) for rule in read.depth_rules] == [
+        (rule.kind, rule.depth, rule.source) for rule in head.depth_rules
+    ]
+    stream = open_survey(tmp_path / "ribs.obj", "solids", ReadingOptions(head=read))
+    back = [one for one in stream.blocks if isinstance(one, SolidRecord)]
+    assert len(back) == len(vault.building.modelled)
+    for one, solid in zip(back, vault.building.modelled, strict=True):
+        assert (one.code, one.kind) == (solid.code, solid.kind)
+        assert {tuple(row) for row in one.vertices.tolist()} == {
+            tuple(row) for row in solid.vertices.tolist()
+        }
+        assert sorted(map(len, one.faces)) == sorted(map(len, solid.faces))
