@@ -92,7 +92,7 @@ def test_kernels_of_another_python_numba_or_processor_are_not_and_one_line_says_
 
 
 def test_an_installation_that_is_read_only_says_so_and_compiles(told, before_numba, monkeypatch, capsys):
-    monkeypatch.setattr(packed, "_is_writable", lambda folder: False)
+    monkeypatch.setattr(os, "access", lambda folder, mode: False)
     assert not told(THIS).keys() & TARGET.keys()
     (line,) = capsys.readouterr().err.splitlines()
     assert "read-only" in line

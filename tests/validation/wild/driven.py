@@ -14,6 +14,11 @@ from tests.validation.wild.stones import fixed, ground, stack
 WIDTH, HEIGHT = 0.4, 1.0
 
 
+# Two periods of 0.5 s with 0.8 of the acceleration g b/h that lifts an edge (West 1882); friction holds.
+@rests("shaken_below_wests_limit", 0.8 * np.sin(2 * np.pi * np.linspace(0.0, 2.0, 201)))
+# 1.5 s with twice g b/h, then 3 s back with g b/h: seen from the ground, gravity leans beyond the edge by 17°. The
+# block turns by θ'' > p² (0.8 - 0.4) cos α, p² = 3 g/(4 R) = 13.7 1/s²: it lies on its side after 0.8 s.
+@falls("shaken_off_its_feet", np.concatenate([np.full(300, 2.0), np.full(600, -1.0)]))
 def _shaken(acceleration):
     """A block on ground that accelerates by these samples, 5 ms apart, in parts of West's g b/h [-]."""
     record = Accelerogram(5e-3, G * WIDTH / HEIGHT * acceleration, "pulse", "made")
@@ -22,21 +27,12 @@ def _shaken(acceleration):
     return scene([ground(), block], 1.0, motion=True, loads=Loads(motions=(motion,)), duration=4.0)
 
 
-@rests
-def shaken_below_wests_limit():
-    """Two periods of 0.5 s with 0.8 of the acceleration g b/h that lifts an edge (West 1882); friction holds."""
-    return _shaken(0.8 * np.sin(2 * np.pi * np.linspace(0.0, 2.0, 201)))
-
-
-@falls
-def shaken_off_its_feet():
-    """1.5 s with twice g b/h, then 3 s back with g b/h: seen from the ground, gravity leans beyond the edge by 17°.
-
-    The block turns by θ'' > p² (0.8 - 0.4) cos α, p² = 3 g/(4 R) = 13.7 1/s²: it lies on its side after 0.8 s.
-    """
-    return _shaken(np.concatenate([np.full(300, 2.0), np.full(600, -1.0)]))
-
-
+# The right pier goes down by 20 mm: the beam turns by 1/50, a thirty-fifth of μ, and slides less than a mm.
+@rests("pier_that_settles", (0.0, 0.0, -0.02))
+# The right pier moves away by 30 mm: whichever end slides, its bearing of 40 mm keeps 10 mm.
+@rests("pier_that_moves_a_little", (0.03, 0.0, 0.0))
+# The right pier moves away by 100 mm, more than both bearings together: the beam is shorter than the gap.
+@falls("pier_that_moves_away", (0.10, 0.0, 0.0))
 def _beam(motion):
     """A beam of 1 m with bearings of 40 mm on two piers, of which the right one moves by (3,) [m] within 1 s."""
     piers = (
@@ -47,36 +43,10 @@ def _beam(motion):
     return scene([*piers, box("beam", (-0.5, -0.15, 0.5), (0.5, 0.15, 0.7))], loads=loads, duration=3.0)
 
 
-@rests
-def pier_that_settles():
-    """The right pier goes down by 20 mm: the beam turns by 1/50, a thirty-fifth of μ, and slides less than a mm."""
-    return _beam((0.0, 0.0, -0.02))
-
-
-@rests
-def pier_that_moves_a_little():
-    """The right pier moves away by 30 mm: whichever end slides, its bearing of 40 mm keeps 10 mm."""
-    return _beam((0.03, 0.0, 0.0))
-
-
-@falls
-def pier_that_moves_away():
-    """The right pier moves away by 100 mm, more than both bearings together: the beam is shorter than the gap."""
-    return _beam((0.10, 0.0, 0.0))
-
-
+# A column of 0.4 m x 1.2 m on a table that tilts to 17°, tan 0.306; it tips at 1/3 and slides at 0.7.
+@rests("table_tilted_inside", 17.0)
+# The same to 20.5°, tan 0.374.
+@falls("table_tilted_outside", 20.5)
 def _tilted(degrees):
     table = TiltingTable.at_rate_degrees((0.0, 1.0, 0.0), 20.0, degrees)
     return scene([ground(), *stack(3, 0.4, 0.4)], 0.7, loads=Loads(gravity=(table,)), duration=3.0)
-
-
-@rests
-def table_tilted_inside():
-    """A column of 0.4 m x 1.2 m on a table that tilts to 17°, tan 0.306; it tips at 1/3 and slides at 0.7."""
-    return _tilted(17.0)
-
-
-@falls
-def table_tilted_outside():
-    """The same to 20.5°, tan 0.374."""
-    return _tilted(20.5)

@@ -17,6 +17,16 @@ def drum_limit(sides, slender):
     return np.cos(np.pi / sides) / slender
 
 
+# Two drums, 2 m high on a circle of 1 m: they tip at λ = cos(π/6)/2 = 0.433; here 0.95 of it.
+@stands("drums_of_6_sides_inside", 6, 0.95)
+# The same at 1.05.
+@falls("drums_of_6_sides_outside", 6, 1.05)
+# Two drums of 16 sides: λ = cos(π/16)/2 = 0.490; here 0.95 of it.
+@stands("drums_of_16_sides_inside", 16, 0.95)
+# The same at 1.05.
+@falls("drums_of_16_sides_outside", 16, 1.05)
+# Two drums of 24 sides: λ = cos(π/24)/2 = 0.496; here 0.95 of it.
+@stands("drums_of_24_sides_inside", 24, 0.95)
 def _drum(sides, part):
     """One drum of diameter 1, height 2, pushed over an edge: along π/n, as the first corner lies on x."""
     angle = np.pi / sides
@@ -24,36 +34,6 @@ def _drum(sides, part):
     base, *drums = column(2, 1.0, 1.0, sides=sides)
     pull = tilted(part * drum_limit(sides, 2.0), towards)
     return scene([base, *drums], 0.9, gravity=pull, duration=2.0)
-
-
-@stands
-def drums_of_6_sides_inside():
-    """Two drums, 2 m high on a circle of 1 m: they tip at λ = cos(π/6)/2 = 0.433; here 0.95 of it."""
-    return _drum(6, 0.95)
-
-
-@falls
-def drums_of_6_sides_outside():
-    """The same at 1.05."""
-    return _drum(6, 1.05)
-
-
-@stands
-def drums_of_16_sides_inside():
-    """Two drums of 16 sides: λ = cos(π/16)/2 = 0.490; here 0.95 of it."""
-    return _drum(16, 0.95)
-
-
-@falls
-def drums_of_16_sides_outside():
-    """The same at 1.05."""
-    return _drum(16, 1.05)
-
-
-@stands
-def drums_of_24_sides_inside():
-    """Two drums of 24 sides: λ = cos(π/24)/2 = 0.496; here 0.95 of it."""
-    return _drum(24, 0.95)
 
 
 @slides
@@ -97,6 +77,10 @@ def overhang_outside():
     return scene(overhanging_stack(8, 1.05))
 
 
+# Four stones in steps of 0.95 L/5: their centre of mass is at 2.5 s from the table's edge less L/2.
+@stands("corbel_inside", 0.95)
+# The same in steps of 1.05 L/5.
+@falls("corbel_outside", 1.05)
 def _corbel(part, count=4):
     """Stones of 1 m that each reach out by s; all of them tip about the table's edge at s = 1/(n + 1)."""
     s = part / (count + 1)
@@ -108,18 +92,11 @@ def _corbel(part, count=4):
     return scene([table, *stones])
 
 
-@stands
-def corbel_inside():
-    """Four stones in steps of 0.95 L/5: their centre of mass is at 2.5 s from the table's edge less L/2."""
-    return _corbel(0.95)
-
-
-@falls
-def corbel_outside():
-    """The same in steps of 1.05 L/5."""
-    return _corbel(1.05)
-
-
+# A corbel of 1 m that reaches out by 0.57 m, with 0.3 m of the same stone on its tail. About the table's edge it
+# turns out by 1 · (0.57 - 0.5) = 0.070, the weight back by 0.3 · (0.43 - 0.15) = 0.084.
+@stands("lapped_corbel_inside", 0.57, 0.3)
+# The same 0.6 m out: it turns out by 0.1, and back by 0.3 · (0.4 - 0.15) = 0.075.
+@falls("lapped_corbel_outside", 0.6, 0.3)
 def _half_lapped(lap, load):
     """A stone of 1 m that reaches over its table by `lap`, held by a stone of `load` m on its other end."""
     table = fixed("table", (-2.0, -0.2, -0.3), (0.0, 0.2, 0.0))
@@ -127,53 +104,26 @@ def _half_lapped(lap, load):
     return scene([table, corbel, box("weight", (lap - 1.0, -0.2, 0.2), (lap - 1.0 + load, 0.2, 0.4))])
 
 
-@stands
-def lapped_corbel_inside():
-    """A corbel of 1 m that reaches out by 0.57 m, with 0.3 m of the same stone on its tail.
-
-    About the table's edge it turns out by 1 · (0.57 - 0.5) = 0.070, the weight back by 0.3 · (0.43 - 0.15) = 0.084.
-    """
-    return _half_lapped(0.57, 0.3)
-
-
-@falls
-def lapped_corbel_outside():
-    """The same 0.6 m out: it turns out by 0.1, and back by 0.3 · (0.4 - 0.15) = 0.075."""
-    return _half_lapped(0.6, 0.3)
-
-
+# 1.05 of the least thickness of 21 voussoirs (linear program).
+@stands("arch_of_21_above_its_least_thickness", 21, 1.05)
+# 0.95 of it.
+@falls("arch_of_21_below_its_least_thickness", 21, 0.95)
+# 1.05 of the least thickness of 9 voussoirs (linear program).
+@stands("arch_of_9_above_its_least_thickness", 9, 1.05)
+# 0.95 of it.
+@falls("arch_of_9_below_its_least_thickness", 9, 0.95)
 def _arch(count, part):
     return scene(semicircular_arch(count, part * LEAST_THICKNESS[count], 1.0, 0.3), 0.8)
-
-
-@stands
-def arch_of_21_above_its_least_thickness():
-    """1.05 of the least thickness of 21 voussoirs (linear program)."""
-    return _arch(21, 1.05)
-
-
-@falls
-def arch_of_21_below_its_least_thickness():
-    """0.95 of it."""
-    return _arch(21, 0.95)
-
-
-@stands
-def arch_of_9_above_its_least_thickness():
-    """1.05 of the least thickness of 9 voussoirs (linear program)."""
-    return _arch(9, 1.05)
-
-
-@falls
-def arch_of_9_below_its_least_thickness():
-    """0.95 of it."""
-    return _arch(9, 0.95)
 
 
 PANEL_LIMIT = 0.39833
 """λ of the panel of 3 x 12 stones at μ = 0.6 (associative linear program; MOMA's tests of statics state it, too)."""
 
 
+# 42 stones at 0.9 of the associative limit; with 0.9 of the friction the limit is still 0.99 of it.
+@stands("wall_tilted_inside", 0.9)
+# 1.04 of the associative limit, which is an upper bound.
+@falls("wall_tilted_outside", 1.04)
 def _panel(part):
     return scene(
         wall(bond(3, 12, halves_first=True), 0.2, 0.1, 0.1),
@@ -181,18 +131,6 @@ def _panel(part):
         gravity=tilted(part * PANEL_LIMIT),
         duration=2,
     )
-
-
-@stands
-def wall_tilted_inside():
-    """42 stones at 0.9 of the associative limit; with 0.9 of the friction the limit is still 0.99 of it."""
-    return _panel(0.9)
-
-
-@falls
-def wall_tilted_outside():
-    """1.04 of the associative limit, which is an upper bound."""
-    return _panel(1.04)
 
 
 @stands

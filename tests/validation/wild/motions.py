@@ -25,6 +25,12 @@ def limit_spin(width, height):
     return np.sqrt(1.5 * G * (1 - np.cos(np.arctan(width / height))) / half)
 
 
+# A block of 0.25 m x 1 m turned about its edge at 0.9 of the rate that overturns it: 0.81 of the energy.
+@rests("rocking_below_housners_limit", 0.25, 1.0, 0.9)
+# The same at 1.1 of that rate: 1.21 of the energy, and no impact before the top.
+@falls("rocking_above_housners_limit", 0.25, 1.0, 1.1)
+# A block of 0.5 m x 0.8 m at 0.85 of its rate: its corner moves by more than half its width on the way.
+@rests("rocking_of_a_squat_block", 0.5, 0.8, 0.85)
 def _kicked(width, height, part, duration=4.0):
     spin = np.array([0.0, part * limit_spin(width, height), 0.0])
     return scene(
@@ -32,40 +38,14 @@ def _kicked(width, height, part, duration=4.0):
     )
 
 
-@rests
-def rocking_below_housners_limit():
-    """A block of 0.25 m x 1 m turned about its edge at 0.9 of the rate that overturns it: 0.81 of the energy."""
-    return _kicked(0.25, 1.0, 0.9)
-
-
-@falls
-def rocking_above_housners_limit():
-    """The same at 1.1 of that rate: 1.21 of the energy, and no impact before the top."""
-    return _kicked(0.25, 1.0, 1.1)
-
-
-@rests
-def rocking_of_a_squat_block():
-    """A block of 0.5 m x 0.8 m at 0.85 of its rate: its corner moves by more than half its width on the way."""
-    return _kicked(0.5, 0.8, 0.85)
-
-
+# Let go at 0.9 of the angle of its balance: it falls back, and each impact takes energy.
+@rests("let_go_inside_its_edge", 0.9)
+# Let go at 1.1 of the angle of its balance: the centre of mass is beyond the edge.
+@falls("let_go_outside_its_edge", 1.1)
 def _leaning(part):
     """A block of 0.25 m x 1 m let go at `part` of the angle atan 0.25 at which its centre is over its edge."""
     block = moved(_block(0.25, 1.0), rotation([0, 1, 0], part * np.degrees(np.arctan(0.25))))
     return scene([ground(), replace(block, velocity=(0.0,) * 6)], 1.0, duration=4.0, motion=True)
-
-
-@rests
-def let_go_inside_its_edge():
-    """Let go at 0.9 of the angle of its balance: it falls back, and each impact takes energy."""
-    return _leaning(0.9)
-
-
-@falls
-def let_go_outside_its_edge():
-    """Let go at 1.1 of the angle of its balance: the centre of mass is beyond the edge."""
-    return _leaning(1.1)
 
 
 def column_barrier(count, width, height):
@@ -84,6 +64,11 @@ def column_barrier(count, width, height):
     return min(energy(i, top[i]) + sum(energy(j, top[i]) for j in range(i + 1, count)) for i in range(count))
 
 
+# Drums of 0.5 m, 0.5 m high, with half the energy of the least barrier of all ways to hinge.
+@rests("rocking_column_of_three_drums", 3, 0.5, 0.5, 0.5)
+# Drums 0.5 m wide and 0.15 m high with 0.6 of the energy of the least barrier: the top moves by more than half the
+# height of a drum, fast, and comes back.
+@rests("rocking_column_of_ten_flat_drums", 10, 0.5, 0.15, 0.6)
 def _rocking_column(count, width, height, part):
     """A column of square drums that turns as one about its right edge with `part` of the energy of the barrier."""
     drums = [
@@ -98,19 +83,6 @@ def _rocking_column(count, width, height, part):
     return scene(
         [ground(), *(turning(one, (0, 0, 0), spin) for one in drums)], 0.8, duration=4.0, motion=True
     )
-
-
-@rests
-def rocking_column_of_three_drums():
-    """Drums of 0.5 m, 0.5 m high, with half the energy of the least barrier of all ways to hinge."""
-    return _rocking_column(3, 0.5, 0.5, 0.5)
-
-
-@rests
-def rocking_column_of_ten_flat_drums():
-    """Drums 0.5 m wide and 0.15 m high with 0.6 of the energy of the least barrier: the top moves by more than half
-    the height of a drum, fast, and comes back."""
-    return _rocking_column(10, 0.5, 0.15, 0.6)
 
 
 @rests

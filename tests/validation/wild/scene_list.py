@@ -7,6 +7,8 @@ form, or says that the linear program of `tests.validation.statics.limit_analysi
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
+from typing import Any
 
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Scene, SolverSettings, TimeSettings
@@ -31,7 +33,7 @@ class Wild:
 
     Attributes
     ----------
-    name : of the function
+    name : of the function, or of the case of it
     truth : verdict
     build : makes the scene
     pace : factor on the time steps, for scenes that are slower than stones of a metre on Earth [-]
@@ -43,12 +45,24 @@ class Wild:
     pace: float = 1.0
 
 
-def wild(truth: Truth, pace: float = 1.0) -> Callable[[Callable[[], Scene]], Callable[[], Scene]]:
-    """Enter a function that makes a scene in the list."""
+def wild(truth: Truth, pace: float = 1.0) -> Callable[..., Any]:
+    """Enter a function that makes a scene in the list: under its name, or under one given with its arguments.
 
-    def enter(build: Callable[[], Scene]) -> Callable[[], Scene]:
-        assert build.__name__ not in SCENES, build.__name__
-        SCENES[build.__name__] = Wild(build.__name__, truth, build, pace)
+    >>> @wild(Truth.STANDS)
+    ... def cube(): ...
+    >>> @wild(Truth.STANDS)("low", 1.0)
+    ... @wild(Truth.FALLS)("high", 3.0)
+    ... def tower(height): ...
+    """
+
+    def enter(made: Callable[[], Scene] | str, *given: object) -> Callable[..., Any]:
+        if isinstance(made, str):
+            return partial(_entered, name=made, given=given)
+        return _entered(made, made.__name__, ())
+
+    def _entered(build: Callable[..., Scene], name: str, given: tuple[object, ...]) -> Callable[..., Scene]:
+        assert name not in SCENES, name
+        SCENES[name] = Wild(name, truth, partial(build, *given), pace)
         return build
 
     return enter

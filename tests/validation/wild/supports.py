@@ -97,6 +97,10 @@ def wedge_in_an_inverted_slot():
     return scene([left, right, wedge], 0.4)
 
 
+# A stone held by friction alone between a wall and a stone that is pushed: 2 μ P = 1.2 W.
+@stands("squeezed_pair_that_holds", 1.2)
+# The same with 2 μ P = 0.8 W.
+@falls("squeezed_pair_that_lets_go", 0.8)
 def _squeezed(part):
     """A block between a fixed wall and a pusher on a frictionless sill; 2 μ P = part · W."""
     block = box("block", (0.0, -0.15, 0.5), (0.3, 0.15, 0.8))
@@ -108,18 +112,6 @@ def _squeezed(part):
     force = StoneForce(frozenset({"pusher"}), History(np.array([0.0]), np.array([[-push, 0.0, 0.0]])))
     wall_ = fixed("wall", (-1.0, -0.5, 0.0), (0.0, 0.5, 1.5))
     return scene([wall_, block, pusher, sill], 0.5, rules=(law,), loads=Loads(forces=(force,)))
-
-
-@stands
-def squeezed_pair_that_holds():
-    """A stone held by friction alone between a wall and a stone that is pushed: 2 μ P = 1.2 W."""
-    return _squeezed(1.2)
-
-
-@falls
-def squeezed_pair_that_lets_go():
-    """The same with 2 μ P = 0.8 W."""
-    return _squeezed(0.8)
 
 
 def opening(
