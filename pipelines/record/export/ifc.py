@@ -91,10 +91,7 @@ class _Writer:
             self._id("project"),
             "$",
             text(self._building.title),
-            "$",
-            "$",
-            "$",
-            "$",
+            *"$$$$",
             list_of([context]),
             assigned,
         )
@@ -106,38 +103,9 @@ class _Writer:
     def _spatial(self) -> str:
         """Add site and building, and return the building."""
         title = text(self._building.title)
-        site = self._file.add(
-            "IFCSITE",
-            self._id("site"),
-            "$",
-            title,
-            "$",
-            "$",
-            self._place,
-            "$",
-            "$",
-            enumeration("ELEMENT"),
-            "$",
-            "$",
-            "$",
-            "$",
-            "$",
-        )
-        house = self._file.add(
-            "IFCBUILDING",
-            self._id("building"),
-            "$",
-            title,
-            "$",
-            "$",
-            self._place,
-            "$",
-            "$",
-            enumeration("ELEMENT"),
-            "$",
-            "$",
-            "$",
-        )
+        about = "$", title, *"$$", self._place, *"$$", enumeration("ELEMENT")  # $: not stated
+        site = self._file.add("IFCSITE", self._id("site"), *about, *"$$$$$")
+        house = self._file.add("IFCBUILDING", self._id("building"), *about, *"$$$")
         self._relate("IFCRELAGGREGATES", "sites", self._project, list_of([site]))
         self._relate("IFCRELAGGREGATES", "buildings", site, list_of([house]))
         return house

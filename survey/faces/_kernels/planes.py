@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from survey.arrays import Array
+from survey.geometry._kernels.vectors import cross
 
 _COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
 _UNCHECKED = 1e-9  # share of the other points in a residual below which they do not check it
@@ -27,18 +28,6 @@ class Points(NamedTuple):
 
     local: Array
     root: Array
-
-
-@njit(cache=True, inline="always")
-def dot(u, v):
-    """Return the scalar product of two vectors of three components."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-@njit(cache=True, inline="always")
-def cross(u, v):
-    """Return the vector product of two vectors of three components, as a tuple."""
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @njit(cache=True)

@@ -5,8 +5,9 @@ import math
 import numpy as np
 from numba import njit
 
-from survey.faces._kernels.planes import Points, dot, leverages, orient, precision, weighted_plane
+from survey.faces._kernels.planes import Points, leverages, orient, precision, weighted_plane
 from survey.faces._kernels.triples import STARTS, beside_the_rest, cost, search_triples, smallest
+from survey.geometry._kernels.vectors import dot
 
 FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # status of `fit_face`
 

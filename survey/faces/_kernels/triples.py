@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from survey.faces._kernels.planes import cross, dot
+from survey.geometry._kernels.vectors import cross, dot
 
 STARTS = 6  # planes of least truncated squares that are kept
 

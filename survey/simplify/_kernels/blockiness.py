@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numba import njit
 
-from survey.geometry._kernels.vectors import dot
+from survey.geometry._kernels.vectors import cross, dot, minus
 
 
 @njit(cache=True)
@@ -28,7 +28,7 @@ def area_vectors(vertices, corners, starts):
     for f in range(len(starts) - 1):
         o = vertices[corners[starts[f]]]
         for c in range(starts[f] + 1, starts[f + 1] - 1):
-            x, y, z = _cross(_minus(vertices[corners[c]], o), _minus(vertices[corners[c + 1]], o))
+            x, y, z = cross(minus(vertices[corners[c]], o), minus(vertices[corners[c + 1]], o))
             out[f, 0], out[f, 1], out[f, 2] = out[f, 0] + 0.5 * x, out[f, 1] + 0.5 * y, out[f, 2] + 0.5 * z
     return out
 
@@ -82,11 +82,11 @@ def volume(vertices, corners, starts):
     origin = vertices[corners[0]]
     total = 0.0
     for f in range(len(starts) - 1):
-        a = _minus(_middle(vertices, corners, starts[f], starts[f + 1]), origin)
+        a = minus(_middle(vertices, corners, starts[f], starts[f + 1]), origin)
         for c in range(starts[f], starts[f + 1]):
             following = c + 1 if c + 1 < starts[f + 1] else starts[f]
-            second, third = _minus(vertices[corners[c]], origin), _minus(vertices[corners[following]], origin)
-            total += dot(a, _cross(second, third))
+            second, third = minus(vertices[corners[c]], origin), minus(vertices[corners[following]], origin)
+            total += dot(a, cross(second, third))
     return total / 6.0
 
 
@@ -114,8 +114,8 @@ def worst_angle(vertices, corners, starts):
             if g < 0:
                 continue
             n, m = planes[f], planes[g]
-            turn = _cross((n[0], n[1], n[2]), (m[0], m[1], m[2]))
-            sine = dot(turn, _minus(vertices[q], vertices[p]))
+            turn = cross((n[0], n[1], n[2]), (m[0], m[1], m[2]))
+            sine = dot(turn, minus(vertices[q], vertices[p]))
             exterior = math.copysign(math.atan2(math.sqrt(dot(turn, turn)), dot(n, m)), sine)
             worst = max(worst, abs(0.5 * math.pi - exterior))
     return worst
@@ -149,10 +149,10 @@ def edge_distances(points, vertices, corners, starts):
     for f in range(len(starts) - 1):
         for c in range(starts[f], starts[f + 1]):
             a = vertices[corners[c]]
-            u = _minus(vertices[corners[c + 1 if c + 1 < starts[f + 1] else starts[f]]], a)
+            u = minus(vertices[corners[c + 1 if c + 1 < starts[f + 1] else starts[f]]], a)
             square = dot(u, u)
             for i in range(len(points)):
-                w = _minus(points[i], a)
+                w = minus(points[i], a)
                 along = min(max(dot(w, u) / square, 0.0), 1.0) if square > 0.0 else 0.0
                 w = (w[0] - along * u[0], w[1] - along * u[1], w[2] - along * u[2])
                 out[i] = min(out[i], math.sqrt(dot(w, w)))
@@ -279,15 +279,4 @@ def _pieces(body, heights, inside):
 @njit(cache=True)
 def _six_volumes(four):
     o = four[0]
-    return dot(_minus(four[1], o), _cross(_minus(four[2], o), _minus(four[3], o)))
-
-
-@njit(cache=True)
-def _cross(u, v):
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-
-
-@njit(cache=True)
-def _minus(a, b):
-    """Return a - b as a tuple: array expressions take numba much longer to compile."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return dot(minus(four[1], o), cross(minus(four[2], o), minus(four[3], o)))
