@@ -148,6 +148,7 @@ def _relations(session: Session, number: int) -> Iterator[Event]:
         seen = [row for row in rows if (row.kind if row.subject_id == number else INVERSE[row.kind]) == kind]
 
         def told(relation: Relation) -> Values:
+            """Return a relation as values."""
             other = relation.object if relation.subject_id == number else relation.subject
             return {
                 "code": other.code,

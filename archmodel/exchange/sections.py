@@ -109,6 +109,7 @@ def _ordered(mappers: dict[Any, Mapper[Any]]) -> Iterator[Table]:
     """Yield tables after what they refer to; of those that could come next, the first in reading order."""
 
     def rank(table: Table) -> tuple[int, int]:
+        """Return the place of a table in the order of reading."""
         module = mappers[table].class_.__module__.rpartition(".")[2]
         known = module in _READING_ORDER
         return _READING_ORDER.index(module) if known else len(_READING_ORDER), declared.index(table)

@@ -113,6 +113,7 @@ class SectionStore:
         table, (key, *_) = self._section.table, self._section.key
 
         def execute(rows: Sequence[Row]) -> None:
+            """Set the references of some rows, one statement for each column."""
             for name in dict.fromkeys(name for row in rows for name in row.later):
                 statement = update(table).where(table.c[key] == bindparam("moma_key"))
                 targets = [

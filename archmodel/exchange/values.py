@@ -168,10 +168,12 @@ def _array(shape: tuple[int, ...]) -> Value:
     """Return the form of an array: nested lists, with null for NaN."""
 
     def encode(array: Array) -> list[Any]:
+        """Return an array as nested lists."""
         nested: list[Any] = array.tolist()
         return nested if np.isfinite(array).all() else _sayable(nested)
 
     def decode(value: Any) -> Array:
+        """Return the array of nested lists."""
         flat = _flattened(value, shape, "")
         if {*map(type, flat)} <= {float}:
             array = np.array(flat, dtype=np.float64)

@@ -256,6 +256,7 @@ def _own(attribute: StoneAttribute) -> Attribute:
     """Make the attribute of a kind: in a column or, for a registered kind, in the entity's JSON."""
 
     def value(scope: Scope, run: int | None) -> ColumnElement[Any]:
+        """Return the expression of the attribute in SQL."""
         if attribute.name in Entity.__table__.c:
             typed: ColumnElement[Any] = scope.entity.c[attribute.name]
             return typed

@@ -121,6 +121,7 @@ def reporting(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def run(**options: Any) -> None:
+        """Build the dataclasses of options, run the command, and say what failed."""
         verbose = bool(options.get("verbose"))
         for name, group in groups.items():
             options[name] = group(**{field.name: options.pop(field.name) for field in fields(group)})
@@ -209,6 +210,7 @@ def _short_warnings() -> Iterator[None]:
         file: TextIO | None = None,
         line: str | None = None,
     ) -> None:
+        """Say a warning in a line."""
         say(f"warning: {' '.join(str(message).split())}")
 
     with warnings.catch_warnings():

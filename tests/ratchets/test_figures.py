@@ -16,7 +16,7 @@ MOST = {
     "numbers of pipelines": 536,
     "long functions": 25,
     "wide functions": 0,
-    "undocumented functions": 46,
+    "undocumented functions": 0,
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 

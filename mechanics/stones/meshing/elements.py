@@ -32,23 +32,28 @@ class Element(StrEnum):
     HEX27 = "hex27"
 
     @property
-    def cell_nodes(self) -> int:  # noqa: D102 - see the class
+    def cell_nodes(self) -> int:
+        """Nodes of a cell."""
         return int(self.value[3:])
 
     @property
-    def corners(self) -> int:  # noqa: D102
+    def corners(self) -> int:
+        """Number of corners among them."""
         return 4 if self.is_tetrahedron else 8
 
     @property
-    def facet_nodes(self) -> int:  # noqa: D102
+    def facet_nodes(self) -> int:
+        """Nodes of a facet."""
         return {"tet4": 3, "tet10": 6, "hex8": 4, "hex20": 8, "hex27": 9}[self.value]
 
     @property
-    def facet_corners(self) -> int:  # noqa: D102
+    def facet_corners(self) -> int:
+        """Number of corners among them."""
         return 3 if self.is_tetrahedron else 4
 
     @property
-    def order(self) -> int:  # noqa: D102
+    def order(self) -> int:
+        """Order of the displacement along an edge."""
         return 1 if self in (Element.TET4, Element.HEX8) else 2
 
     @property

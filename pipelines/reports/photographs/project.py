@@ -251,6 +251,7 @@ def _with_lengths(
     index = {name: k for k, name in enumerate(network.names)}
 
     def points(names: Texts, *path: str) -> tuple[int, ...]:
+        """Return the numbers of points that are named."""
         for name in names:
             if name not in index:
                 document.fail(f"no point {name!r} is marked", *path, remedy=nearest(name, tuple(index)))

@@ -80,6 +80,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
 
     @contextmanager
     def asking(at: str | None = None) -> Iterator[Session]:
+        """Give a session that reads, for a limited time, of now or of an earlier state."""
         if not room.acquire(timeout=settings.patience):
             raise HTTPException(503, "Too many questions at once; try again.", {"Retry-After": "5"})
         try:
@@ -101,6 +102,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
 
     @app.get("/", response_class=HTMLResponse)
     def home() -> Response:
+        """Show what the database holds."""
         with asking() as session:
             return _page("home.html", **answers.home(session, database.home.place))
 
@@ -113,6 +115,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
         at: When = None,
         format: Format = "html",
     ) -> Response:
+        """Answer a query as a page, JSON, CSV or GeoJSON."""
         asked = tuple(one for one in where if one.strip())
         names = (
             COLUMNS if columns is None else tuple(one.strip() for one in columns.split(",") if one.strip())
@@ -141,6 +144,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
 
     @app.get("/entity/{code:path}")
     def entity(code: str, at: When = None, format: Page = "html") -> Response:
+        """Show an entity with its history."""
         with asking(at) as session:
             told = describe(session, code)
             events = [asdict(event) for event in history(session, code)]
@@ -150,12 +154,14 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
 
     @app.get("/runs")
     def runs(format: Page = "html") -> Response:
+        """List all runs."""
         with asking() as session:
             found = list_runs(session)
         return JSONResponse(found) if format == "json" else _page("runs.html", runs=found)
 
     @app.get("/runs/{number}")
     def run(number: int, format: Page = "html") -> Response:
+        """Show a run."""
         if not 1 <= number < 2**31:
             raise HTTPException(404, "There is no such run.")
         with asking() as session:
@@ -164,12 +170,14 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
 
     @app.get("/schema")
     def kinds(format: Page = "html") -> Response:
+        """Show all kinds and attributes."""
         with asking() as session:
             tree = schema(session)
         return JSONResponse(tree) if format == "json" else _page("told.html", title="Schema", told=tree)
 
     @app.get("/view", response_class=HTMLResponse)
     def view(kind: Kind = "entity", where: Where = (), run: Run = None, at: When = None) -> Response:
+        """Show the stones that a query finds, to turn."""
         asked = tuple(one for one in where if one.strip())
         with asking(at) as session:
             text = answers.view(session, latest_entry(session), kind, asked, run, dated=bool(at))
@@ -177,6 +185,7 @@ def application(database: Database, settings: ServeSettings, editor: Editor | No
 
     @app.get("/stones.glb")
     def glb(kind: Kind = "entity", where: Where = (), run: Run = None) -> Response:
+        """Return the stones that a query finds as a file of glTF."""
         asked = tuple(one for one in where if one.strip())
         with asking() as session:
             data = answers.glb(session, kind, asked, run)
@@ -190,12 +199,14 @@ def _edits(app: FastAPI, editor: Editor) -> None:
 
     @app.get(_EDITED, response_class=HTMLResponse)
     def outlines() -> Response:
+        """Show the editor of outlines."""
         text = editor.page()
         policy = _policy(text).replace("default-src 'none';", "default-src 'none'; connect-src 'self';")
         return HTMLResponse(text, headers={"Content-Security-Policy": policy})
 
     @app.post(_EDITED)
     async def save(request: Request) -> Response:
+        """Save outlines of the editor."""
         content = bytearray()
         async for part in request.stream():
             content += part
@@ -219,6 +230,7 @@ def _policy(page: str) -> str:
     """Return the content security policy of a page: its own script and style by their hashes, nothing else."""
 
     def hashes(found: list[str]) -> str:
+        """Return the hashes of scripts or styles."""
         sums = (base64.b64encode(hashlib.sha256(one.encode()).digest()).decode() for one in found)
         return " ".join(f"'sha256-{one}'" for one in sums) or "'none'"
 
@@ -233,16 +245,19 @@ def _refusals(app: FastAPI) -> None:
 
     @app.exception_handler(MomaError)
     def moma_error(request: Request, error: MomaError) -> Response:
+        """Answer an error of ours with its words."""
         missing = isinstance(error, UsageError) and error.what.startswith(("there is no ", "no "))
         status = 404 if missing else 400 if isinstance(error, UsageError) else 503
         return _refusal(request, status, str(error) if not isinstance(error, DatabaseError) else error.what)
 
     @app.exception_handler(StarletteHTTPException)
     def http_error(request: Request, error: StarletteHTTPException) -> Response:
+        """Answer an error of the protocol with its words."""
         return _refusal(request, error.status_code, str(error.detail), error.headers)
 
     @app.exception_handler(RequestValidationError)
     def wrong_request(request: Request, error: RequestValidationError) -> Response:
+        """Answer a request that is not understood with what is wrong."""
         told = "; ".join(f"{one['loc'][-1]}: {one['msg']}" for one in error.errors())
         return _refusal(request, 422, told)
 
@@ -259,6 +274,7 @@ def _guards(app: FastAPI, settings: ServeSettings, edits: bool) -> None:
 
     @app.middleware("http")
     async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
+        """Answer a request if it only reads, or saves outlines, and has the token."""
         given = _given(request)
         allowed = settings.token is None or hmac.compare_digest(given.encode(), settings.token.encode())
         posted = edits and request.method == "POST" and request.url.path == _EDITED
@@ -300,6 +316,7 @@ class _Heads:
             return
 
         async def without_body(message: Message) -> None:
+            """Pass a message on without its content."""
             await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
 
         await self._app({**scope, "method": "GET"}, receive, without_body)

@@ -28,7 +28,8 @@ class _Numbered(Protocol):
     """An entry with the line that it was read from."""
 
     @property
-    def line(self) -> int: ...
+    def line(self) -> int:
+        """Number of the line."""
 
 
 @dataclass(frozen=True)

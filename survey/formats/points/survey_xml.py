@@ -33,6 +33,7 @@ def open_landxml(path: Path, options: ReadingOptions | None = None) -> SurveyStr
     values: list[str] = []
 
     def element(where: str, attributes: Mapping[str, str], text: str, line: int) -> None:
+        """Collect a unit, an attribute or a point at its end."""
         name = where.rpartition("/")[2]
         if name in ("Metric", "Imperial"):
             linear = attributes.get("linearUnit", "meter").casefold()
@@ -70,6 +71,7 @@ def open_jobxml(path: Path, options: ReadingOptions | None = None) -> SurveyStre
     of_points: dict[str, list[str]] = {}  # values of attributes, which the field book alone may have
 
     def element(where: str, given: Mapping[str, str], text: str, line: int) -> None:
+        """Collect an attribute, a station or a point at its end."""
         parent, _, name = where.rpartition("/")
         if name in elements and parent.rpartition("/")[2] in ("Reductions", "FieldBook"):
             elements[name].append((dict(now), line))
@@ -131,19 +133,23 @@ def _parse(path: Path, element: Element) -> None:
     parser.buffer_text = True
 
     def start(name: str, attributes: Mapping[str, str]) -> None:
+        """Open an element."""
         bare = name.rpartition("|")[2]
         where = f"{open_[-1][0]}/{bare}" if open_ else bare
         open_.append((where, attributes, [], parser.CurrentLineNumber))
 
     def end(_: str) -> None:
+        """Close an element, and hand it on."""
         where, attributes, text, line = open_.pop()
         element(where, attributes, "".join(text), line)
 
     def text(some: str) -> None:
+        """Add text to the innermost element."""
         if open_:
             open_[-1][2].append(some)
 
     def refuse(*_: object) -> None:
+        """Refuse entities, by which small files could grow without limit."""
         raise SurveyError(
             "the file declares entities", where=f"{path}:{parser.CurrentLineNumber}", remedy="export it again"
         )

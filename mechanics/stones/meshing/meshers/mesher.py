@@ -31,21 +31,36 @@ class Meshable(Protocol):
     """A stone to be meshed, such as a deformable `mechanics.scene.scene.Block`; fields as there."""
 
     @property
-    def code(self) -> str: ...  # noqa: D102 - see the class
+    def code(self) -> str:
+        """Code of the stone."""
+
     @property
-    def vertices(self) -> Array: ...  # noqa: D102
+    def vertices(self) -> Array:
+        """Corners (nv, 3) [m]."""
+
     @property
-    def faces(self) -> tuple[tuple[int, ...], ...]: ...  # noqa: D102
+    def faces(self) -> tuple[tuple[int, ...], ...]:
+        """Corners of each face, counter-clockwise seen from outside."""
+
     @property
-    def element(self) -> Element: ...  # noqa: D102
+    def element(self) -> Element:
+        """Finite element of its cells."""
+
     @property
-    def mesh_size(self) -> float | None: ...  # noqa: D102
+    def mesh_size(self) -> float | None:
+        """Edge of a cell; None of rigid stones [m]."""
+
     @property
-    def contact_size(self) -> float | None: ...  # noqa: D102
+    def contact_size(self) -> float | None:
+        """Edge of a facet in joints; None: as the mesh [m]."""
+
     @property
-    def growth(self) -> float: ...  # noqa: D102
+    def growth(self) -> float:
+        """Size of a cell over that of its neighbour towards the joints [-]."""
+
     @property
-    def mesher(self) -> Mesher: ...  # noqa: D102
+    def mesher(self) -> Mesher:
+        """Program that makes the mesh."""
 
 
 @dataclass(frozen=True)
