@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -57,28 +56,25 @@ def name_stones(
     kinds = [""] * len(rings)
     for opening in openings:
         _around(rings, boxes, opening, kinds, coursed)
+    if not coursed:
+        order = _reading_order(boxes)
+        place_of = {k: place for place, k in enumerate(order, start=1)}
+        return [
+            Named(f"S{place_of[k]:03d}", kind or "rubble", None, place_of[k]) for k, kind in enumerate(kinds)
+        ]
     arch = np.array([kind in ("voussoir", "keystone") for kind in kinds])
-    courses = _courses(boxes, arch) if coursed else _rows(boxes)
-    if coursed:
-        _corners(boxes, courses, kinds, cut or [False] * len(rings))
-    out: list[Named | None] = [None] * len(rings)
+    courses = _courses(boxes, arch)
+    _corners(boxes, courses, kinds, cut or [False] * len(rings))
+    out: dict[int, Named] = {}
     for number, members in enumerate(courses, start=1):
         for place, k in enumerate(members, start=1):
             size = boxes[k, 1] - boxes[k, 0]
-            kind = kinds[k] or (
-                ("header" if size[0] < _HEADER * size[1] else "stretcher") if coursed else "rubble"
-            )
-            out[k] = Named(f"C{number:02d}-{place:02d}", kind, number if coursed else None, place)
-    place = 0
-    for k in sorted(np.flatnonzero(arch).tolist(), key=lambda one: float(boxes[one, :, 0].mean())):
-        if out[k] is None:
-            place += 1
-            out[k] = Named(f"V{place:02d}", kinds[k], None, place)
-    if not coursed:
-        order = [k for members in courses for k in members]
-        for place, k in enumerate(order, start=1):
-            out[k] = Named(f"S{place:03d}", kinds[k] or "rubble", None, place)
-    return [one for one in out if one is not None]
+            kind = kinds[k] or ("header" if size[0] < _HEADER * size[1] else "stretcher")
+            out[k] = Named(f"C{number:02d}-{place:02d}", kind, number, place)
+    across = sorted(np.flatnonzero(arch).tolist(), key=lambda k: float(boxes[k, :, 0].mean()))
+    for place, k in enumerate(across, start=1):
+        out[k] = Named(f"V{place:02d}", kinds[k], None, place)
+    return [out[k] for k in range(len(rings))]
 
 
 def _courses(boxes: Array, arch: Array) -> list[list[int]]:
@@ -131,14 +127,13 @@ def _joined_rows(rows: list[list[int]], boxes: Array) -> list[list[int]]:
     return [sorted(row, key=lambda k: float(boxes[k, 0, 0])) for row in out]
 
 
-def _rows(boxes: Array) -> list[list[int]]:
+def _reading_order(boxes: Array) -> list[int]:
     """Return stones in rows of about a stone's height, from the ground, each from left to right."""
     middles = boxes.mean(axis=1)
     height = float(np.median(boxes[:, 1, 1] - boxes[:, 0, 1]))
     row = np.floor((middles[:, 1] - middles[:, 1].min()) / max(height, 1e-9) + 0.5)
-    order = np.lexsort((middles[:, 0], row))
-    ends = [0, *(np.flatnonzero(np.diff(row[order])) + 1).tolist(), len(order)]
-    return [order[a:b].tolist() for a, b in pairwise(ends)]
+    order: list[int] = np.lexsort((middles[:, 0], row)).tolist()
+    return order
 
 
 def _around(rings: Sequence[Array], boxes: Array, opening: Array, kinds: list[str], coursed: bool) -> None:

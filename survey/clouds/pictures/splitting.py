@@ -21,7 +21,6 @@ from survey.clouds.pictures.joints import STRONGEST, WIDTH, Field, Strength
 _ACROSS = 0.6  # part of the height of a region that a line crosses at least
 _LEAN = 4  # pixels by which the ends of a line lean to either side
 _CLEAR = 2.0  # distance from the ends of a region over the width of a joint
-_MAX_LINES = 6  # lines across one region at most
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,9 @@ def propose_missing(
 
     out = regions.copy()
     following = int(out.max()) + 1
-    waiting = [(k, box, 0) for k, box in enumerate(find_objects(out), start=1) if box is not None]
+    waiting = [(k, box) for k, box in enumerate(find_objects(out), start=1) if box is not None]
     while waiting:
-        number, box, depth = waiting.pop()
+        number, box = waiting.pop()
         best: tuple[float, Bools] | None = None
         for axis, whole, after, line in _lines(out, number, box, strength, hidden):
             chance = float(expit(line_features(whole, after, line) @ np.array(weights)))
@@ -79,8 +78,7 @@ def propose_missing(
         if best is None:
             continue
         out[box][best[1]] = following
-        if depth + 1 < _MAX_LINES:
-            waiting += [(number, box, depth + 1), (following, box, depth + 1)]
+        waiting += [(part, _within(box, out[box] == part)) for part in (number, following)]
         following += 1
     return out
 
@@ -172,6 +170,13 @@ def line_features(whole: Bools, after: Bools, line: Line) -> Array:
     fill = (first * first / _box_area(before) + second * second / _box_area(after)) / total
     size = np.log(min(np.sqrt(min(first, second)) / WIDTH, 20.0))
     return np.array([1.0, line.strength, line.gaps, line.prominence, total / _box_area(whole) - fill, size])
+
+
+def _within(box: tuple[slice, ...], mask: Bools) -> tuple[slice, ...]:
+    """Return the box of the pixels that are chosen within a box."""
+    starts = (int(side.start) for side in box)
+    places = ((start, np.flatnonzero(mask.any(axis=1 - axis))) for axis, start in enumerate(starts))
+    return tuple(slice(start + int(chosen[0]), start + int(chosen[-1]) + 1) for start, chosen in places)
 
 
 def _box_area(mask: Bools) -> float:

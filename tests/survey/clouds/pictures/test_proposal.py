@@ -10,7 +10,6 @@ from survey.clouds.settings import OutlineSettings
 from tests.survey.clouds.pictures.walls import as_picture, courses, found_overlaps, painted, photograph
 
 pytest.importorskip("shapely")
-pytestmark = pytest.mark.slow  # each takes about a second
 
 BOXES, SHAPE = courses()
 
