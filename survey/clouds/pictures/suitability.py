@@ -18,7 +18,7 @@ _CERTAIN = 4.0  # standard errors beyond which a change of direction is none by 
 _MIN_STONES = 4  # stones from which a wall can be judged
 _UNSURE = 0.5  # mean score below which stones are more likely false
 _SOFT = 0.44  # detail of a pixel over that of two at an edge blurred by two pixels; at a sharp edge 1.2
-_ROUNDED = 100.0 / 255.0 / np.sqrt(12.0)  # standard deviation of L* that rounding to 8 bits makes
+_ROUNDED = 0.113  # standard deviation of L* that rounding to 8 bits makes: 100 / 255 / √12
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ def _detail(pixels: NDArray[np.uint8]) -> float:
 
     height, width = pixels.shape[:2]
     light = lightness(pixels[height // 4 : height // 4 + 600, width // 4 : width // 4 + 600])[0]
-    impulse = np.zeros((33, 33))
-    impulse[16, 16] = _ROUNDED * impulse.size**0.5  # as much variance as noise of that deviation
+    impulse = np.zeros_like(light)
+    impulse[tuple(np.array(light.shape) // 2)] = _ROUNDED * np.sqrt(light.size)  # of the variance of noise
     variances = []
     for image in (light, impulse):
         once, twice = gaussian_filter(image, 1.0), gaussian_filter(image, 2.0)
