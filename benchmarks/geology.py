@@ -34,8 +34,8 @@ from benchmarks.report import (
 )
 from mechanics.arrays import Array
 from mechanics.planar.measures.cells import members
-from mechanics.planar.measures.stress import mean_stress, moments
 from mechanics.planar.measures.taper import critical_slope
+from mechanics.planar.measures.tensors import mean_stress, moments
 from mechanics.planar.measures.tessellation import tessellation
 from pipelines.draw.elevations.sheet import new_sheet
 from pipelines.geology.file import read_geology

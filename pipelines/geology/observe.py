@@ -11,9 +11,7 @@ import numpy as np
 from archmodel.quantities import quantities_of
 from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.cells import Cell, layer_members, members, shape_of
-from mechanics.planar.measures.fabric import fabric_of
-from mechanics.planar.measures.strain import deformation
-from mechanics.planar.measures.stress import mean_stress, moments
+from mechanics.planar.measures.tensors import deformation, fabric_of, mean_stress, moments
 from mechanics.planar.measures.tessellation import Tessellation, tessellation
 from mechanics.planar.result import PlanarInstant
 
