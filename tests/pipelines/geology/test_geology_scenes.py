@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import get_args
 
 import meshio
 import numpy as np
@@ -489,7 +490,7 @@ def test_a_cell_outside_the_sample_is_refused_at_its_line(tmp_path):
 
 
 def test_the_command_knows_all_experiments():
-    assert {one.value for one in ExperimentName} == set(EXPERIMENTS)
+    assert {*get_args(ExperimentName)} == set(EXPERIMENTS)
 
 
 @pytest.mark.slow
