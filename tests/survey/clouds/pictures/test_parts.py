@@ -1,5 +1,6 @@
 """Tiles of a picture overlap and give each stone once, in the place of the whole picture."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ def test_parts_of_a_side_are_as_few_as_overlap_by_as_much_as_stated(length, coun
     parts = proposal._overlapping(length, 100, 20)
     assert len(parts) == count
     assert (parts[0].start, parts[-1].stop) == (0, length)
-    for before, after in zip(parts, parts[1:], strict=False):
+    for before, after in pairwise(parts):
         assert before.stop - after.start == 20
     sizes = [part.stop - part.start for part in parts]
     assert max(sizes) <= 100
