@@ -28,63 +28,36 @@ Each name of `__all__` is loaded when it is first used. A survey goes into a dat
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ground.errors import MomaError
+from ground.errors import MomaError as MomaError
 
 if TYPE_CHECKING:
-    from archmodel.database.session import open_database
-    from archmodel.describe.history import history
-    from archmodel.describe.trace import trace
-    from archmodel.query.api import find, find_rows
-    from archmodel.relations.load_paths import load_path
-    from mechanics.results.result import Result
-    from mechanics.scene.scene import Block, Fidelity, Scene
-    from mechanics.scene.stages import Stage
-    from mechanics.simulate import simulate, simulate_stages
-    from mechanics.stones.materials import Material
-    from pipelines.assess.assess import assess
-    from pipelines.ingest.ingest import ingest
-    from pipelines.record.export.compas_solve import moma_solve
-    from pipelines.record.record import record
-    from pipelines.reports.survey.report import report_surveys
-    from pipelines.run.assemble import assemble
-    from pipelines.run.run import run_scene
-    from pipelines.scene.file import read_scene
-    from survey.clouds.settings import CloudOptions, MaskOptions
-    from survey.formats.options import ReadingOptions
-    from survey.formats.reading import open_survey
-    from survey.registration.stones import survey_stones
-
-__all__ = [
-    "Block",
-    "CloudOptions",
-    "Fidelity",
-    "MaskOptions",
-    "Material",
-    "MomaError",
-    "ReadingOptions",
-    "Result",
-    "Scene",
-    "Stage",
-    "__version__",
-    "assemble",
-    "assess",
-    "find",
-    "find_rows",
-    "history",
-    "ingest",
-    "load_path",
-    "moma_solve",
-    "open_database",
-    "open_survey",
-    "read_scene",
-    "record",
-    "report_surveys",
-    "run_scene",
-    "simulate",
-    "simulate_stages",
-    "survey_stones",
-    "trace",
-]
+    from archmodel.database.session import open_database as open_database
+    from archmodel.describe.history import history as history
+    from archmodel.describe.trace import trace as trace
+    from archmodel.query.api import find as find
+    from archmodel.query.api import find_rows as find_rows
+    from archmodel.relations.load_paths import load_path as load_path
+    from mechanics.results.result import Result as Result
+    from mechanics.scene.scene import Block as Block
+    from mechanics.scene.scene import Fidelity as Fidelity
+    from mechanics.scene.scene import Scene as Scene
+    from mechanics.scene.stages import Stage as Stage
+    from mechanics.simulate import simulate as simulate
+    from mechanics.simulate import simulate_stages as simulate_stages
+    from mechanics.stones.materials import Material as Material
+    from pipelines.assess.assess import assess as assess
+    from pipelines.ingest.ingest import ingest as ingest
+    from pipelines.record.export.compas_solve import moma_solve as moma_solve
+    from pipelines.record.record import record as record
+    from pipelines.reports.survey.report import report_surveys as report_surveys
+    from pipelines.run.assemble import assemble as assemble
+    from pipelines.run.run import run_scene as run_scene
+    from pipelines.scene.file import read_scene as read_scene
+    from survey.clouds.settings import CloudOptions as CloudOptions
+    from survey.clouds.settings import MaskOptions as MaskOptions
+    from survey.formats.options import ReadingOptions as ReadingOptions
+    from survey.formats.reading import open_survey as open_survey
+    from survey.registration.stones import survey_stones as survey_stones
 
 _HOMES = {
     "Block": "mechanics.scene.scene",
@@ -115,6 +88,7 @@ _HOMES = {
     "survey_stones": "survey.registration.stones",
     "trace": "archmodel.describe.trace",
 }
+__all__ = [*_HOMES, "MomaError", "__version__"]
 
 __version__: str
 

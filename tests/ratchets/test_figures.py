@@ -8,7 +8,7 @@ import pytest
 from tests.ratchets.figures import FIGURES, WORDS, identifier, parameters, per_10_000
 
 MOST = {
-    "numbers of ground": 22,
+    "numbers of ground": 21,
     "numbers of moma": 20,
     "numbers of survey": 912,
     "numbers of archmodel": 92,
@@ -20,7 +20,7 @@ MOST = {
 }
 """Today's figures: whoever lowers one lowers its bound, and nobody raises one."""
 
-MOST_OF_10_000 = {"all": 112, "one": 22}
+MOST_OF_10_000 = {"all": 112, "one": 21}
 """Empty words among identifiers: all that are listed, and the most frequent."""
 
 REMEDY = {
