@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.arrays import Array
-from mechanics.planar.measures.outline import sides_of
+from mechanics.planar.measures.surface import sides_of
 
 
 @dataclass(frozen=True)
