@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report import Row, columns, guarded, options_of, progress, show
-from pipelines.assess.compare import facades_of
 from pipelines.assess.diagnosis.file import DiagnosisFile, read_diagnosis
 from pipelines.assess.diagnosis.measurements import Measurements, measure, measurements
 from pipelines.assess.diagnosis.ranking import Ranking, verdict
@@ -26,6 +25,7 @@ from pipelines.ingest.ingest import ingest
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
 from survey.formats.native.writer import write_moma
+from survey.quality.facades import facades_of
 from survey.quality.precision import appraise
 from synthetic.building import SyntheticBuilding
 from synthetic.samples import recipe_of

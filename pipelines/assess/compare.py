@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from sqlalchemy.orm import Session
 
 from archmodel.database.session import open_database
@@ -40,7 +39,7 @@ from pipelines.scene.file import SceneFile, read_scene
 from pipelines.scene.selection import StoneModel, select_groups, select_stones
 from pipelines.scene.stages import refuse_stages
 from survey.quality.departures.beds import measure_beds
-from survey.quality.facades import Facade, find_facades
+from survey.quality.facades import Facade, facades_of
 from survey.quality.movement import (
     CourseMovement,
     Misfit,
@@ -195,15 +194,6 @@ def measured_stones(models: Sequence[StoneModel]) -> tuple[tuple[StoneQuality, .
     records = [model.record for model in models if model.record.provenance in _MEASURED]
     stones = tuple(appraise(surveyed_block(record)) for record in records)
     return stones, facades_of(stones)
-
-
-def facades_of(stones: Sequence[StoneQuality]) -> tuple[Facade, ...]:
-    """Return the facades that measured stones make."""
-    return find_facades(
-        np.array([stone.normal for stone in stones]).reshape(-1, 3),
-        np.array([stone.area for stone in stones]),
-        np.array([stone.outline.mean(axis=0) for stone in stones]).reshape(-1, 3),
-    )
 
 
 def _summary(

@@ -34,7 +34,7 @@ from archmodel.tables.hierarchy import kinds_below
 from archmodel.tables.structures import structure_kind_named, structure_kinds
 from mechanics.arrays import Array, Ints
 from survey.geometry.adjacency import PolyhedraBuilder, SolidArrays, find_touching
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
 
 
@@ -57,12 +57,7 @@ def masonry_values(
             zones[face.zone].append(face)
     found: dict[int, dict[str, float | None]] = {}
     for faces in zones.values():
-        facades = find_facades(
-            np.array([face.normal for face in faces]),
-            np.array([face.area for face in faces]),
-            np.array([face.outline.mean(axis=0) for face in faces]),
-        )
-        for wall in judge_masonry([_stone(face) for face in faces], facades):
+        for wall in judge_masonry([_stone(face) for face in faces], facades_of(faces)):
             values = _values(wall)
             found.update((faces[i].id, values) for i in wall.stones.tolist())
     return found

@@ -16,7 +16,7 @@ from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools
 from survey.geometry.polygons import ring_area, seamless
 from survey.quality.canon import ENOUGH
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 
 _DEEP = 0.03  # thickness of the overlap of two faces [m]: two usual joints, more than rough edges interlock
 _JOINT = 0.05  # distance of the boxes of two faces that have a joint [m]
@@ -102,8 +102,7 @@ def misplaced_corners(faces: Sequence[SeenFace]) -> tuple[Misplaced, ...]:
     askew = {kind: _least_askew(members) for kind, members in kinds.items()}
     findings = [finding for members in kinds.values() for finding in _odd_sizes(members)]
     middles = np.array([face.outline.mean(axis=0) for face in faces]).reshape(-1, 3)
-    normals = np.array([face.normal for face in faces]).reshape(-1, 3)
-    for facade in find_facades(normals, np.array([face.area for face in faces]), middles):
+    for facade in facades_of(faces):
         members = [faces[i] for i in facade.members.tolist()]
         flat = [facade.frame.flatten(member.outline) for member in members]
         away = (middles[facade.members] - facade.frame.origin) @ facade.frame.axes[2]

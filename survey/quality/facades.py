@@ -1,7 +1,8 @@
 """Facades: stones that face one way, and the elevation in which they are drawn and measured."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,31 @@ class Facade:
     frame: WallPlane
     azimuth: float | None
     area: float
+
+
+class Faced(Protocol):
+    """Anything with a face, such as a stone."""
+
+    @property
+    def normal(self) -> Array:
+        """Unit outward normal (3,) [-]."""
+
+    @property
+    def area(self) -> float:
+        """Area of the face [m²]."""
+
+    @property
+    def outline(self) -> Array:
+        """Outline of the face (nv, 3) [m]."""
+
+
+def facades_of(stones: Sequence[Faced]) -> tuple[Facade, ...]:
+    """Group stones by the direction that they face; see `find_facades`."""
+    return find_facades(
+        np.array([stone.normal for stone in stones]).reshape(-1, 3),
+        np.array([stone.area for stone in stones]),
+        np.array([stone.outline.mean(axis=0) for stone in stones]).reshape(-1, 3),
+    )
 
 
 def find_facades(normals: Array, areas: Array, centroids: Array) -> tuple[Facade, ...]:

@@ -8,9 +8,8 @@ import pytest
 
 from archmodel.database.session import Database, open_database
 from archmodel.store.stone_record import StoneRecord
-from archmodel.store.stones import store_survey
 from tests.archmodel.reused_databases import Recycled
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 from tests.postgresql import Server
 
 WALL = (
@@ -57,6 +56,5 @@ def empty(new_database: Callable[[], Database]) -> Database:
 
 @pytest.fixture
 def filled(empty: Database) -> Database:
-    with empty.session() as session:
-        store_survey(session, "window", "window.moma", SHA, WALL)
+    store(empty, WALL, "window")
     return empty

@@ -1,17 +1,26 @@
 """Stones whose every number is known in closed form, and the contents of a database as text."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 
 import numpy as np
 from sqlalchemy import MetaData, select
 
-from archmodel.database.session import Database
+from archmodel.database.session import Database, open_database
 from archmodel.store.run_record import RunRecord, StoneResult
 from archmodel.store.stone_record import StoneRecord
+from archmodel.store.stones import store_survey
 
 SHA = "ab" * 32
 
 BOX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+
+
+def store(into: Database | str, stones: Iterable[StoneRecord], survey: str = "wall") -> None:
+    """Store stones as one survey in a database, or in the one of a URL."""
+    opened = open_database(into) if isinstance(into, str) else nullcontext(into)
+    with opened as database, database.session() as session:
+        store_survey(session, survey, f"{survey}.moma", SHA, stones)
 
 
 def box_stone(

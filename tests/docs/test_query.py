@@ -15,13 +15,12 @@ from archmodel.query.functions.usages import STRUCTURE_USAGES, USAGES
 from archmodel.query.grammar import MAX_CALLS, MAX_DEPTH
 from archmodel.query.scope import MAX_FUNCTIONS, MAX_RUNS
 from archmodel.query.tokens import MAX_LENGTH
-from archmodel.store.stones import store_survey
 from archmodel.tables.entities import canon_of, kinds
 from archmodel.tables.hierarchy import definition_of, kind_of
 from ground.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import MEMBERS, RELATIONS, STRUCTURES, furnish
-from tests.archmodel.stones import SHA
+from tests.archmodel.stones import store
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs" / "query.md").read_text(encoding="utf-8")
@@ -53,8 +52,7 @@ def table(heading: str) -> list[list[str]]:
 def furnished_wall(url: str) -> Iterator[Database]:
     """The wall of the page in a new database."""
     with open_database(url) as database:
-        with database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, WALL)
+        store(database, WALL, "window")
         furnish(database)
         yield database
 

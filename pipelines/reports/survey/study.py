@@ -24,7 +24,7 @@ from survey.quality.departures.beds import CHANCE as BED_CHANCE
 from survey.quality.departures.beds import WallBeds, find_bed_movements
 from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
 from survey.quality.departures.faces import WallFace, find_face_departures
-from survey.quality.facades import Facade, find_facades
+from survey.quality.facades import Facade, facades_of
 from survey.quality.masonry.index import Grade
 from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
 from survey.quality.plausible import LENGTH, doubt_of
@@ -217,11 +217,7 @@ def _judge(
 ) -> SurveyStudy:
     progress(Progress("judge", 0, 3, "courses and faces"))
     quality = judge_survey(stones)
-    facades = find_facades(
-        np.array([stone.normal for stone in stones]).reshape(-1, 3),
-        np.array([stone.area for stone in stones]),
-        np.array([stone.outline.mean(axis=0) for stone in stones]).reshape(-1, 3),
-    )
+    facades = facades_of(stones)
     usual = standards(stones, _canons(files))
     odd = contradictions(stones, facades)
     tilts = [file.transform.covariance[3:6, 3:6] for file in files if file.transform is not None]

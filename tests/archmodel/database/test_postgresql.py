@@ -16,7 +16,7 @@ from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Entity
 from ground.errors import DatabaseError, MissingLibraryError
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import SHA, box_stone, store
 from tests.postgresql import Server
 
 
@@ -161,8 +161,7 @@ def test_a_writer_sees_what_was_written_while_it_waited(url: str) -> None:
 def test_a_reader_sees_one_state_throughout(url: str) -> None:
     with open_database(url) as database, database.session(read_only=True) as reading:
         assert reading.scalars(select(Entity.code)).all() == []
-        with database.session() as session:
-            store_survey(session, "a", "a.moma", SHA, [box_stone("A1")])
+        store(database, [box_stone("A1")], "a")
         assert reading.scalars(select(Entity.code)).all() == []
 
 

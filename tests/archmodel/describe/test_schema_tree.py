@@ -27,7 +27,7 @@ from archmodel.tables.relations import INVERSE
 from archmodel.tables.structures import structure_kinds
 from ground.errors import QueryError, UsageError
 from moma.cli.text.schema import schema_lines
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import SHA, box_stone, store
 
 
 def branches(tree: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -156,8 +156,7 @@ def test_another_database_does_not_know_them(
     with_merlon: Database, new_database: Callable[[], Database]
 ) -> None:
     other = new_database()
-    with other.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("H1", "header")])
+    store(other, [box_stone("H1", "header")])
     with other.session(read_only=True) as session:
         with pytest.raises(QueryError, match="unknown attribute 'form'"):
             find(session, "entity", "form = flat")

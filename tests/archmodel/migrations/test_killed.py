@@ -18,10 +18,9 @@ from archmodel.assertions.terms import declare_term
 from archmodel.database.session import open_database
 from archmodel.migrations.migrate import LAYOUTS, migrate
 from archmodel.store.find_by_code import subjects
-from archmodel.store.stones import store_survey
 from archmodel.tables.entries import new_entry
 from tests.archmodel.migrations.next_version import connected, rows_of
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
 
@@ -30,8 +29,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are f
 def url(new_url: Callable[[], str]) -> str:
     """The URL of a database of version 2 with rows in the tables that version 1 lacks."""
     made = new_url()
-    with open_database(made) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("A"), box_stone("B", at=(2.0, 0.0, 0.0))])
+    store(made, [box_stone("A"), box_stone("B", at=(2.0, 0.0, 0.0))])
     fill(made)
     return made
 

@@ -19,12 +19,11 @@ from archmodel.exchange.reader import import_building
 from archmodel.exchange.writer import write_building
 from archmodel.migrations.migrate import LAYOUTS, migrate
 from archmodel.query.api import find
-from archmodel.store.stones import store_survey
 from archmodel.tables.layout import SCHEMA_VERSION
 from archmodel.tables.surveys import Measurement
 from ground.errors import DatabaseError, UsageError
 from tests.archmodel.migrations.next_version import connected
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 from tests.paths import ROOT
 
 VERSION1 = Path(__file__).with_name("version1")
@@ -115,8 +114,7 @@ def test_what_version_1_cannot_hold_is_told_on_the_way_back(old: Path):
 def test_a_database_with_newer_columns_that_says_version_1_keeps_what_they_hold(tmp_path: Path):
     """Programs between both versions made these: all columns but those of the cells of disks."""
     url = f"sqlite:///{tmp_path / 'between.db'}"
-    with open_database(url) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("W01-01")])
+    store(url, [box_stone("W01-01")])
     with connected(url) as connection:
         for column in ("spread_x", "spread_y", "a"):
             connection.execute(text(f"ALTER TABLE cell_result DROP COLUMN {column}"))

@@ -24,7 +24,7 @@ from ground.errors import DatabaseError, UsageError
 from tests.archmodel.migrations import next_version
 from tests.archmodel.migrations.next_version import LAYOUTS, connected, rows_of, run_alembic
 from tests.archmodel.random_databases import fill
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 
 NewUrl = Callable[[], str]
 
@@ -51,8 +51,7 @@ def names(url: str) -> set[tuple[str, str | None]]:
 def wall(new_url: NewUrl) -> str:
     """The URL of a database of version 2 with two surveyed stones."""
     url = new_url()
-    with open_database(url) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("W01-01"), box_stone("W01-02")])
+    store(url, [box_stone("W01-01"), box_stone("W01-02")])
     return url
 
 
@@ -76,8 +75,7 @@ def test_from_nothing_the_scripts_lead_to_the_declared_layout(new_url: NewUrl, v
         run_alembic(connection, f"{version:04d}")
     assert differences(url, version) == []
     if version == 2:
-        with open_database(url, create=False) as database, database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, [box_stone("A1")])
+        store(url, [box_stone("A1")], "window")
 
 
 def test_indexes_and_keys_are_named_as_in_a_new_database(new_url: NewUrl, wall: str, newest: None) -> None:
@@ -158,8 +156,7 @@ def test_a_migration_that_fails_changes_nothing(
 def file(tmp_path: Path) -> Path:
     """An SQLite file of version 2 with a stone."""
     file = tmp_path / "old.db"
-    with open_database(f"sqlite:///{file}") as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("W01-01")])
+    store(f"sqlite:///{file}", [box_stone("W01-01")])
     return file
 
 

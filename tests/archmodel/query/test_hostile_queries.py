@@ -15,11 +15,10 @@ from archmodel.database.session import Database, open_database
 from archmodel.query.api import find, find_rows
 from archmodel.query.attributes import ATTRIBUTES
 from archmodel.query.functions.registry import FUNCTIONS, STRUCTURE_FUNCTIONS
-from archmodel.store.stones import store_survey
 from ground.errors import QueryError
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import furnish
-from tests.archmodel.stones import SHA, box_stone, contents
+from tests.archmodel.stones import box_stone, contents, store
 
 LONGEST = 1.0
 """That an answer or a refusal may take [s]."""
@@ -29,8 +28,7 @@ LONGEST = 1.0
 def database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     """The furnished wall. Nothing in this module may change it, though its sessions could write."""
     with _new_url(request, tmp_path_factory) as url, open_database(url) as database:
-        with database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, WALL)
+        store(database, WALL, "window")
         furnish(database)
         before = contents(database)
         yield database
@@ -323,8 +321,7 @@ def test_an_injected_statement_is_no_argument_of_a_function(database: Database, 
 
 def test_a_code_with_every_quote_in_it_is_found_by_its_quoted_text(empty: Database) -> None:
     code = """W'1"';DROP--%_\\"""
-    with empty.session() as session:
-        store_survey(session, "odd", "odd.moma", SHA, [box_stone(code), box_stone("W2")])
+    store(empty, [box_stone(code), box_stone("W2")], "odd")
     assert ask(empty, "code = '" + code.replace("'", "''") + "'") == [code]
     assert ask(empty, 'code = "' + code.replace('"', '""') + '"') == [code]
     assert ask(empty, "code like '" + code.replace("'", "''") + "'") == [code]
@@ -394,8 +391,7 @@ def test_expressions_at_the_limits_are_answered(database: Database, name: str, e
 
 
 def test_a_pattern_of_wildcards_does_not_hang(empty: Database) -> None:
-    with empty.session() as session:
-        store_survey(session, "long", "long.moma", SHA, [box_stone("a" * 300)])
+    store(empty, [box_stone("a" * 300)], "long")
     assert ask(empty, "code like '" + "%a" * 250 + "%b'") == []
     assert ask(empty, "code like '" + "%a_" * 90 + "%b'") == []
 

@@ -5,17 +5,15 @@ from sqlalchemy import event, text
 
 from archmodel.database.session import Database, open_database
 from archmodel.query.api import find, find_rows
-from archmodel.store.stones import store_survey
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import furnish
-from tests.archmodel.stones import SHA
+from tests.archmodel.stones import store
 
 
 @pytest.fixture(scope="module")
 def database():
     with open_database("sqlite://") as database:
-        with database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, WALL)
+        store(database, WALL, "window")
         furnish(database)
         yield database
 

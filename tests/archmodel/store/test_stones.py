@@ -9,7 +9,7 @@ from archmodel.query.api import find
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones, store_survey, survey_with_hash
 from ground.errors import DatabaseError, GeometryError, MomaError, SurveyError
-from tests.archmodel.stones import SHA, box_stone, contents
+from tests.archmodel.stones import SHA, box_stone, contents, store
 
 OTHER = "cd" * 32
 
@@ -56,8 +56,7 @@ def test_entities_can_be_loaded_in_a_later_session(filled: Database) -> None:
 
 def test_more_stones_than_one_statement_holds(empty: Database) -> None:
     stones = [box_stone(f"S{i}") for i in range(1201)]
-    with empty.session() as session:
-        store_survey(session, "big", "big.moma", SHA, iter(stones))
+    store(empty, iter(stones), "big")
     with empty.session(read_only=True) as session:
         loaded = load_stones(session, find(session, "entity"))
     assert [r.code for r in loaded] == [f"S{i}" for i in range(1201)]
@@ -164,9 +163,8 @@ def test_a_reader_that_fails_half_way_leaves_nothing(filled: Database) -> None:
 
 def test_a_file_is_taken_in_once(filled: Database) -> None:
     before = contents(filled)
-    with pytest.raises(DatabaseError, match=r"copy\.moma: this file is in the database already"):  # noqa: SIM117
-        with filled.session() as session:
-            store_survey(session, "copy", "copy.moma", SHA, [box_stone("A1")])
+    with pytest.raises(DatabaseError, match=r"copy\.moma: this file is in the database already"):
+        store(filled, [box_stone("A1")], "copy")
     assert contents(filled) == before
 
 

@@ -6,11 +6,9 @@ from collections.abc import Callable
 import pytest
 from sqlalchemy import insert
 
-from archmodel.database.session import open_database
-from archmodel.store.stones import store_survey
 from tests.archmodel.migrations import next_version
 from tests.archmodel.migrations.next_version import connected, rows_of
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 from tests.moma.commands import invoke
 
 
@@ -18,8 +16,7 @@ from tests.moma.commands import invoke
 def old(new_url: Callable[[], str], monkeypatch: pytest.MonkeyPatch) -> str:
     """The URL of a database of version 2, for a program of the made-up version 3."""
     url = new_url()
-    with open_database(url) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("W01-01")])
+    store(url, [box_stone("W01-01")])
     next_version.declare(monkeypatch)
     return url
 

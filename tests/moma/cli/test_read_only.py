@@ -10,7 +10,7 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from ground.errors import DatabaseError
-from tests.archmodel.stones import SHA, box_stone, contents
+from tests.archmodel.stones import SHA, box_stone, contents, store
 from tests.paths import ROOT
 
 
@@ -31,8 +31,7 @@ def shelf(tmp_path):
     """A folder with a database of two stones."""
     shelf = tmp_path / "a shelf"
     shelf.mkdir()
-    with open_database(f"sqlite:///{shelf / 'moma.db'}") as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, [box_stone("A"), box_stone("B")])
+    store(f"sqlite:///{shelf / 'moma.db'}", [box_stone("A"), box_stone("B")])
     if shutil.which("unshare") is None or mounted(shelf, "true").returncode != 0:
         pytest.skip("this system lets nobody mount")
     return shelf
@@ -83,8 +82,7 @@ def test_rows_in_the_log_of_a_database_are_read_or_it_is_refused(shelf):
 def test_without_the_right_to_write_its_folder_a_database_can_be_read(tmp_path, monkeypatch):
     url = f"sqlite:///{tmp_path / 'moma.db'}"
     with open_database(url) as database:
-        with database.session() as session:
-            store_survey(session, "wall", "wall.moma", SHA, [box_stone("A")])
+        store(database, [box_stone("A")])
         before = contents(database)
     monkeypatch.setattr("archmodel.database.sqlite.os.access", lambda *_: False)
     with open_database(url, create=False) as database:

@@ -11,7 +11,6 @@ import pytest
 from scipy import stats
 
 from ground.errors import SceneError
-from pipelines.assess.compare import facades_of
 from pipelines.assess.diagnosis.dating import date_movement
 from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit, fit
@@ -26,6 +25,7 @@ from pipelines.scene.file import parse_scene
 from pipelines.toml.lines import parse_toml
 from pipelines.toml.writer import toml_text
 from survey.quality.deformation import Deformation
+from survey.quality.facades import facades_of
 from survey.quality.precision import appraise
 from synthetic.buildings.walls import wall
 from synthetic.frame import RigidMotion

@@ -15,7 +15,6 @@ from archmodel.describe.entity import describe
 from archmodel.query.api import find_faces, find_rows
 from archmodel.query.geojson import feature_collection
 from archmodel.store.revisions import RowCounts
-from archmodel.store.stones import store_survey
 from archmodel.stratigraphy.graphml import read_graphml
 from archmodel.tables.entities import Entity
 from archmodel.tables.knowledge import Note, Statement
@@ -24,7 +23,7 @@ from pipelines.draw.stratigraphy.matrix import draw, study
 from pipelines.record.export.export import export_file
 from pipelines.record.record import record
 from survey.clouds.outlines.vector import read_vector
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 from tests.archmodel.stratigraphy.drawings import artifact, drawing, group, line, shape
 
 STONES = (
@@ -37,8 +36,7 @@ STONES = (
 @pytest.fixture
 def url(new_url: Callable[[], str]) -> str:
     made = new_url()
-    with open_database(made) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, STONES)
+    store(made, STONES)
     return made
 
 
@@ -247,8 +245,7 @@ def test_a_relation_of_stones_by_geometry_is_none_of_structures(url: str, tmp_pa
 
 def test_a_column_of_damage_takes_terms_in_any_language(new_url: Callable[[], str], tmp_path: Path):
     made = new_url()
-    with open_database(made) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, STONES)
+    store(made, STONES)
     terms = file(
         tmp_path,
         "terms.toml",

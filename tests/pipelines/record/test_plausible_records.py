@@ -9,13 +9,12 @@ from sqlalchemy import select
 
 from archmodel.database.session import open_database
 from archmodel.query.api import find
-from archmodel.store.stones import store_survey
 from archmodel.tables.entries import Entry
 from archmodel.tables.knowledge import Phase
 from ground.errors import QueryError, UsageError
 from moma.cli.text.knowledge import record_lines
 from pipelines.record.record import record
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 
 STONES = (
     box_stone("A/1", "header", size=(0.4, 0.8, 0.5), at=(0.0, 0.0, 0.0)),
@@ -28,8 +27,7 @@ OBSERVATION = '[[observation]]\ntype = "crack"\nstones = ["A/1"]\n'
 @pytest.fixture
 def url(tmp_path: Path) -> str:
     made = f"sqlite:///{tmp_path / 'x.db'}"
-    with open_database(made) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, STONES)
+    store(made, STONES)
     return made
 
 

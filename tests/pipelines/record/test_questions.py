@@ -9,11 +9,10 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.query.api import attributes, find, find_rows
 from archmodel.query.tally import count_by, sorted_rows
-from archmodel.store.stones import store_survey
 from ground.errors import QueryError, UsageError
 from pipelines.record.record import record
 from pipelines.results.table_csv import csv_text
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 
 STONES = (
     box_stone("A1", "header", course=1, size=(0.3, 0.6, 0.5), at=(0.0, 0.0, 0.0)),
@@ -76,8 +75,7 @@ stones = ["B2"]
 @pytest.fixture
 def url(new_url: Callable[[], str], tmp_path) -> str:
     made = new_url()
-    with open_database(made) as database, database.session() as session:
-        store_survey(session, "wall", "wall.moma", SHA, STONES)
+    store(made, STONES)
     path = tmp_path / "k.toml"
     path.write_text(KNOWLEDGE, encoding="utf-8")
     record([path], made)

@@ -18,7 +18,7 @@ from archmodel.tables.structures import Structure
 from ground.errors import UsageError
 from pipelines.record.file import read_record
 from pipelines.record.record import record
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import SHA, box_stone, store
 
 STONES = (
     box_stone("W01-01", "header", course=1, at=(0.0, 0.0, 0.0)),
@@ -59,8 +59,7 @@ stones = ["V1"]
 @pytest.fixture
 def url(new_url: Callable[[], str]) -> str:
     made = new_url()
-    with open_database(made) as database, database.session() as session:
-        store_survey(session, "window", "window.moma", SHA, STONES)
+    store(made, STONES, "window")
     return made
 
 
@@ -303,8 +302,7 @@ def test_what_is_wrong_is_named_with_its_line(
 def filled_once(tmp_path_factory: pytest.TempPathFactory) -> str:
     """A database that no test changes."""
     url = f"sqlite:///{tmp_path_factory.mktemp('wall') / 'moma.db'}"
-    with open_database(url) as database, database.session() as session:
-        store_survey(session, "window", "window.moma", SHA, STONES)
+    store(url, STONES, "window")
     return url
 
 

@@ -8,13 +8,12 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.query.api import find_rows
 from archmodel.store.revisions import RowCounts
-from archmodel.store.stones import store_survey
 from archmodel.tables.terms import Term, vocabulary
 from ground.errors import UsageError
 from pipelines.record.export.export import export_file
 from pipelines.record.record import record
 from tests.archmodel.skos.test_readers import TURTLE
-from tests.archmodel.stones import SHA, box_stone
+from tests.archmodel.stones import box_stone, store
 
 TERMS = """
 [record]
@@ -42,10 +41,7 @@ iri = "http://marks.example.org/6"
 @pytest.fixture
 def url(new_url: Callable[[], str]) -> str:
     made = new_url()
-    with open_database(made) as database, database.session() as session:
-        store_survey(
-            session, "wall", "wall.moma", SHA, [box_stone("S1", "header", course=1, at=(0.0, 0.0, 0.0))]
-        )
+    store(made, [box_stone("S1", "header", course=1, at=(0.0, 0.0, 0.0))])
     return made
 
 

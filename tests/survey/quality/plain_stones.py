@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.quality.facades import Facade, find_facades
 from survey.quality.precision import StoneQuality
 
 SIGMA = 0.002
@@ -62,11 +61,3 @@ def rectangle(
     """Return a stone with an upright rectangular face, (x, z) its lower left corner."""
     polygon = [(x, z), (x + length, z), (x + length, z + height), (x, z + height)]
     return polygon_stone(code, kind, polygon, **changes)
-
-
-def facades_of(stones: list[StoneQuality]) -> tuple[Facade, ...]:
-    return find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from survey.quality.contradictions import Contradiction, contradictions
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.plain_stones import SIGMA, facades_of, polygon_stone, rectangle
+from tests.survey.quality.plain_stones import SIGMA, polygon_stone, rectangle
 
 
 def found(stones: list[StoneQuality]) -> tuple[Contradiction, ...]:

@@ -7,8 +7,9 @@ import pytest
 from scipy.stats import kstest
 
 from survey.quality.courses import CourseLine, course_heights, lower_corners, measure_courses
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality
-from tests.survey.quality.plain_stones import facades_of, polygon_stone, rectangle
+from tests.survey.quality.plain_stones import polygon_stone, rectangle
 
 
 def lines_of(stones: list[StoneQuality]) -> tuple[CourseLine, ...]:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.assess.compare import facades_of
 from survey.quality.deformation import Built, measure_deformation
+from survey.quality.facades import facades_of
 from survey.quality.precision import appraise
 from synthetic.buildings.walls import wall
 from synthetic.measure import HALF_JOINT

@@ -4,22 +4,17 @@ import numpy as np
 import pytest
 
 from survey.quality.courses import measure_courses
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 from survey.quality.movement import compare_courses, compare_plumb
 from survey.quality.precision import appraise
 from synthetic.buildings.walls import wall
 from synthetic.frame import RigidMotion
 from tests.survey.quality.departures import walls_by_hand
-from tests.survey.quality.plain_stones import facades_of
 
 
 def surveyed(building):
     stones = tuple(appraise(block) for block in building.blocks())
-    facades = find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
+    facades = facades_of(stones)
     return stones, facades
 
 

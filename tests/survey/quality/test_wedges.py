@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from survey.quality.courses import measure_courses
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import sides_of, spanning_stones
 from tests.survey.quality.departures.test_beds import beds_of
-from tests.survey.quality.plain_stones import facades_of, polygon_stone, rectangle
+from tests.survey.quality.plain_stones import polygon_stone, rectangle
 
 CENTRE, INNER, OUTER = (3.0, 0.4), 1.0, 1.35
 ANGLES = np.linspace(math.radians(35.0), math.radians(145.0), 10)

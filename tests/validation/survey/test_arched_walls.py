@@ -7,7 +7,7 @@ from pipelines.reports.survey.study import CHANCES
 from survey.quality.courses import measure_courses
 from survey.quality.departures.beds import WallBeds, find_bed_movements
 from survey.quality.departures.faces import FaceMovement, WallFace, find_face_departures
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality
 from tests.validation.survey.arched_walls import ArchedWall, arched_survey, leaning_part, some_arched_wall
 from tests.validation.survey.moved_walls import still
@@ -16,11 +16,7 @@ pytest.importorskip("shapely")
 
 
 def findings(stones: list[StoneQuality]) -> list[WallBeds | WallFace]:
-    facades = find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
+    facades = facades_of(stones)
     lengths = {one.code: one.length for one in stones}
     beds = find_bed_movements(measure_courses(stones, facades), lengths, CHANCES["beds"])
     return [*beds, *find_face_departures(stones, facades, CHANCES["faces"])]

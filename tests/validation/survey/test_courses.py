@@ -18,7 +18,7 @@ from survey.faces.faces import outline_face
 from survey.quality.canon import deviations, standards
 from survey.quality.contradictions import contradictions
 from survey.quality.courses import measure_courses
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 from survey.quality.precision import appraise
 from survey.records.survey import BlockRecord
 
@@ -64,14 +64,6 @@ def wall(rng, courses=(1, 2, 3), laid=BED, chips=()):
             code = f"W{course}-{k}"
             stones.append(measured_stone(rng, code, "ashlar", course, corners, chip=0.06 * (code in chips)))
     return stones
-
-
-def facades_of(stones):
-    return find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
 
 
 def lines_of(stones):

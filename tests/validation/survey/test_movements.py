@@ -16,7 +16,7 @@ from survey.quality.courses import measure_courses
 from survey.quality.departures.beds import WallBeds, find_bed_movements
 from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
 from survey.quality.departures.faces import OddStone, WallFace, find_face_departures
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality, judge_survey
 from survey.quality.remeasure import ShortList, list_remeasures, short_list
 from tests.validation.survey.moved_walls import (
@@ -50,11 +50,7 @@ class Findings:
 
 
 def findings(stones: list[StoneQuality]) -> Findings:
-    facades = find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
+    facades = facades_of(stones)
     lengths = {one.code: one.length for one in stones}
     (beds,) = find_bed_movements(measure_courses(stones, facades), lengths, CHANCES["beds"])
     (face,) = find_face_departures(stones, facades, CHANCES["faces"])

@@ -13,13 +13,12 @@ import pytest
 from archmodel.database.session import open_database
 from archmodel.describe.schema_tree import schema
 from archmodel.query.attributes import ATTRIBUTES
-from archmodel.store.stones import store_survey
 from archmodel.tables.entities import Rubble, Voussoir, kinds, own_attributes
 from moma.cli.text.formats import as_table
 from moma.cli.text.schema import print_schema, schema_lines
 from tests.archmodel.conftest import WALL
 from tests.archmodel.known_wall import furnish
-from tests.archmodel.stones import SHA
+from tests.archmodel.stones import store
 from tests.moma.commands import answer, invoke, prints
 
 
@@ -27,8 +26,7 @@ from tests.moma.commands import answer, invoke, prints
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     url = f"sqlite:///{tmp_path_factory.mktemp('answers') / 'moma.db'}"
     with open_database(url) as database:
-        with database.session() as session:
-            store_survey(session, "window", "window.moma", SHA, WALL)
+        store(database, WALL, "window")
         furnish(database)
     return url
 

@@ -480,8 +480,8 @@ def test_a_doubtful_stone_on_which_a_verdict_depends_says_so():
     """A row of stones whose only settlement is that of few: without one of them it is not found."""
     from pipelines.reports.survey.study import _movements, _verdicts
     from survey.quality.courses import measure_courses
+    from survey.quality.facades import facades_of
     from tests.survey.quality.departures.walls_by_hand import wall
-    from tests.survey.quality.plain_stones import facades_of
 
     stones = wall(4, lambda s, c: -0.05 if s > 5.2 and c <= 2 else 0.0, beds=0.001, sigma=0.001)
     facades = facades_of(stones)
@@ -495,8 +495,8 @@ def test_a_doubtful_stone_on_which_a_verdict_depends_says_so():
 def test_a_frame_that_control_points_may_have_tilted_leans_no_wall():
     from pipelines.reports.survey.study import _movements
     from survey.quality.courses import measure_courses
+    from survey.quality.facades import facades_of
     from tests.survey.quality.departures.walls_by_hand import wall
-    from tests.survey.quality.plain_stones import facades_of
 
     stones = wall(2, out=lambda s, c: 0.01 * (c - 1) * 0.3 / 2.1)
     facades = facades_of(stones)

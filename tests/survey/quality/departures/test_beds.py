@@ -19,10 +19,11 @@ from survey.quality.departures.beds import (
     measure_beds,
 )
 from survey.quality.departures.shapes import Found, Shape
+from survey.quality.facades import facades_of
 from survey.quality.movement import compare_courses
 from survey.quality.precision import StoneQuality
 from tests.survey.quality.departures.walls_by_hand import Shift, wall
-from tests.survey.quality.plain_stones import facades_of, polygon_stone
+from tests.survey.quality.plain_stones import polygon_stone
 
 MIDDLE = 2.875  # of a wall of 6 m in running bond, between its first and last stone [m]
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from survey.quality.departures.depths import DoubtfulDepth, doubtful_depths
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality
 from survey.records.survey import DepthRule
-from tests.survey.quality.plain_stones import facades_of, polygon_stone, rectangle
+from tests.survey.quality.plain_stones import polygon_stone, rectangle
 
 
 def found(stones: list[StoneQuality], *rules: DepthRule) -> list[DoubtfulDepth]:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from survey.quality.departures.faces import FaceMovement, WallFace, find_face_departures
+from survey.quality.facades import facades_of
 from survey.quality.precision import StoneQuality
 from tests.survey.quality.departures.walls_by_hand import Shift, wall
-from tests.survey.quality.plain_stones import facades_of, polygon_stone
+from tests.survey.quality.plain_stones import polygon_stone
 
 HEIGHT = 2.1  # between the middles of the lowest and the highest of eight courses [m]
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from survey.quality.facades import find_facades
+from survey.quality.facades import facades_of
 from survey.quality.masonry.index import given_grade
 from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
 from tests.survey.quality.masonry.bonds import bond
@@ -28,11 +28,7 @@ def wall(shift: float = 0.5, scale: float = 1.0, lift: float = 0.0, **changes: o
 
 
 def judged(stones: list[WallStone], **given: str) -> list[MasonryQuality]:
-    facades = find_facades(
-        np.array([one.normal for one in stones]),
-        np.array([one.area for one in stones]),
-        np.array([one.outline.mean(axis=0) for one in stones]),
-    )
+    facades = facades_of(stones)
     return list(judge_masonry(stones, facades, {name: given_grade(level) for name, level in given.items()}))
 
 
