@@ -161,13 +161,13 @@ def bond_of(
     return Bond(np.array(WEIGHTS[kind]), {k: float(areas[k]) for k in borders}, limits, borders)
 
 
-def join_weak(bond: Bond) -> None:
+def join_weak(bond: Bond, least: float = LIKELY) -> None:
     """Join regions that are one stone rather than two, the surest first, until all borders are likely."""
     queue = [(bond.probability(a, b), a, b) for a, others in bond.borders.items() for b in others if a < b]
     heapq.heapify(queue)
     while queue:
         chance, a, b = heapq.heappop(queue)
-        if chance >= LIKELY:
+        if chance >= least:
             return
         if a not in bond.borders or b not in bond.borders[a] or chance != bond.probability(a, b):
             continue
