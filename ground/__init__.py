@@ -4,6 +4,7 @@ errors   what fails, with exit code and remedy
 tables   rows and columns of texts and workbooks
 kernels  compiled kernels, loaded before numba
 settings meaning, unit and bounds of a dataclass field
+toml     files of TOML, checked by settings, with the line of what is wrong
 polygons area and centroid of a plane polygon in space
 statistics robust scale, scatter of differences, roots of falling functions
 

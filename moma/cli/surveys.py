@@ -154,8 +154,8 @@ def orient(
     from ground.kernels.beside import compiling_beside
     from moma.cli.text.formats import as_json
     from moma.cli.text.photographs import orient_lines
-    from pipelines.reports.photographs.orient import orient_photographs, photomodeler_project
-    from pipelines.reports.photographs.project import read_project
+    from pipelines.orient.orient import orient_photographs, photomodeler_project
+    from pipelines.orient.project import read_project
 
     if (project is None) == (export.photomodeler is None):
         raise UsageError("neither or both of PROJECT.toml and --photomodeler", remedy="give one of them")

@@ -9,6 +9,9 @@ import numpy as np
 
 from ground.errors import SceneError
 from ground.settings import Setting
+from ground.toml.keys import Numbers, build, keys_of, read_table
+from ground.toml.lines import key_lines, parse_toml, read_text
+from ground.toml.schema import TomlDocument, check_table, nearest, tables_of
 from mechanics.planar.measures.cells import Cell
 from mechanics.scene.loads.motions import ImposedMotion
 from pipelines.geology.experiments.biaxial import Biaxial
@@ -20,9 +23,6 @@ from pipelines.geology.experiments.repose import Repose
 from pipelines.geology.experiments.wedge import Wedge
 from pipelines.geology.observe import WHOLE
 from pipelines.geology.settings import DiskContact, GeologyOutput, Layer, SampleSettings, Stepping, Sweeping
-from pipelines.toml.keys import Numbers, build, keys_of, read_table
-from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import TomlDocument, check_table, nearest, tables_of
 
 EXPERIMENTS: Mapping[str, type[Any]] = {
     "deposit": Deposition,

@@ -17,9 +17,9 @@ from ground.errors import (
     SurveyError,
     UsageError,
 )
+from ground.toml.lines import Path, key_lines, parse_toml, read_text
+from ground.toml.schema import Key, TomlDocument, check_table, nearest, tables_of
 from pipelines.record.keys import ARRAYS, ATTRIBUTE, PROPERTY, RECORD
-from pipelines.toml.lines import Path, key_lines, parse_toml, read_text
-from pipelines.toml.schema import Key, TomlDocument, check_table, nearest, tables_of
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from archmodel.tables.relations import RELATIONS
 from archmodel.tables.stratigraphy import DEFINITIONS, INVERSE
 from archmodel.tables.terms import VOCABULARIES
 from ground.settings import Setting
-from pipelines.toml.keys import Stones, Table, Texts, Vector, Year, keys_of
-from pipelines.toml.schema import Key
+from ground.toml.keys import Stones, Table, Texts, Vector, Year, keys_of
+from ground.toml.schema import Key
 
 WITHDRAWN = (
     "made_of", "of_phase", "decision", "mark", "observation", "reference", "note", "relation", "member", "material",

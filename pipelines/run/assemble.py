@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from archmodel.relations.members import StructureMembers
 from archmodel.store.stone_record import StoneRecord
+from ground.toml.keys import typed_values
 from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.stages import Stage
@@ -23,7 +24,6 @@ from pipelines.scene.loads import FORCES, build_loads, thrown
 from pipelines.scene.selection import SERIES, STRESS, Groups, StoneModel, select_groups, select_stones
 from pipelines.scene.settings import MeshSettings
 from pipelines.scene.stages import StandingStones, standing_stones
-from pipelines.toml.keys import typed_values
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid
 from survey.geometry.stone_parts import stone_parts

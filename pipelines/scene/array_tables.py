@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ground.toml.lines import Path
+from ground.toml.schema import Key, TomlDocument, ValueKind, check_table, tables_of
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.ground_motion import braking_time
 from mechanics.scene.loads.tables import read_history
 from mechanics.scene.loads.time_series import History
-from pipelines.toml.lines import Path
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, tables_of
 
 # alternative to time and value in the inline table of a time series
 _FILE = Key(

@@ -14,6 +14,9 @@ import numpy as np
 from archmodel.store.lookalikes import explained, plain_form
 from ground.errors import SceneError
 from ground.settings import Setting
+from ground.toml.keys import Stones, Vector, build, keys_of, typed_values
+from ground.toml.lines import key_lines, parse_toml, read_text
+from ground.toml.schema import Key, TomlDocument, check_table, nearest
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
@@ -25,9 +28,6 @@ from pipelines.scene.pushover import Pushing, read_pushover
 from pipelines.scene.settings import Fidelities, MaterialRule, MeshSettings, Output, Selection
 from pipelines.scene.site import Site
 from pipelines.scene.stages import read_stages
-from pipelines.toml.keys import Stones, Vector, build, keys_of, typed_values
-from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import Key, TomlDocument, check_table, nearest
 from survey.joints.settings import JointMode, JointSettings
 
 ARRAYS = ("meshes", "laws", "loads", "throw", "stages", "assess")

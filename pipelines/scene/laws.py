@@ -7,6 +7,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ground.settings import Setting
+from ground.toml.keys import Groups, Texts, build, keys_of
+from ground.toml.schema import Key, TomlDocument, nearest
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -15,8 +17,6 @@ from mechanics.scene.laws.lennard_jones import LennardJones
 from mechanics.scene.laws.mortar import MortarJoint
 from mechanics.scene.scene import LawRule
 from pipelines.scene.array_tables import ArrayTable, read_entries
-from pipelines.toml.keys import Groups, Texts, build, keys_of
-from pipelines.toml.schema import Key, TomlDocument, nearest
 
 BONDS = ("mortar", "cohesive_zone", "elastic_joint")
 """Types of laws that are mortar."""

@@ -7,6 +7,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ground.settings import Setting
+from ground.toml.keys import Series, Stones, Vector, VectorSeries, keys_of
+from ground.toml.schema import Key, TomlDocument
 from mechanics.scene.loads.accelerogram import Accelerogram
 from mechanics.scene.loads.forces import StoneForce
 from mechanics.scene.loads.gravity import GravityRamp, TiltingTable
@@ -21,8 +23,6 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.polyhedra import mass_properties
 from pipelines.scene.array_tables import ArrayTable, file_beside, read_entries
 from pipelines.scene.stages import LoadTable
-from pipelines.toml.keys import Series, Stones, Vector, VectorSeries, keys_of
-from pipelines.toml.schema import Key, TomlDocument
 
 _TABLES = (".csv", ".txt", ".dat", ".tsv")  # endings of records that seldom state a unit
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from ground.settings import Setting
+from ground.toml.keys import Numbers, Vector, keys_of, typed_values
+from ground.toml.schema import Key, TomlDocument, ValueKind, check_table
 from mechanics.scene.rig import Rig
-from pipelines.toml.keys import Numbers, Vector, keys_of, typed_values
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table
 
 
 @dataclass(frozen=True, kw_only=True)

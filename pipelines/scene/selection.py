@@ -10,11 +10,11 @@ from archmodel.query.api import MAX_EXPRESSIONS, find, find_rows
 from archmodel.store.stone_record import StoneRecord
 from archmodel.store.stones import load_stones
 from ground.errors import QueryError, UsageError
+from ground.toml.lines import Path
+from ground.toml.schema import nearest
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from pipelines.scene.file import SceneFile
-from pipelines.toml.lines import Path
-from pipelines.toml.schema import nearest
 
 _CODE = re.compile(r"[\w.:/+-]+")  # a text without blanks or comparison is meant as a code
 

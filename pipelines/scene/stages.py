@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 from ground.errors import UsageError
 from ground.settings import Setting
+from ground.toml.keys import Stones, Texts, keys_of
+from ground.toml.lines import Path
+from ground.toml.schema import TomlDocument, nearest
 from pipelines.scene.array_tables import ArrayTable, read_entries
-from pipelines.toml.keys import Stones, Texts, keys_of
-from pipelines.toml.lines import Path
-from pipelines.toml.schema import TomlDocument, nearest
 
 Codes = frozenset[str]
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from archmodel.database.session import open_database
 from ground.errors import UsageError
+from ground.toml.schema import nearest
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
 from mechanics.results.forecast.plan import loose_blocks
@@ -17,7 +18,6 @@ from pipelines.run.assemble import assemble
 from pipelines.run.soundness import caution_of, problems_of, refuse_unsound
 from pipelines.scene.file import read_scene
 from pipelines.scene.stages import refuse_stages
-from pipelines.toml.schema import nearest
 from pipelines.tradeoff.grid import grid
 from pipelines.tradeoff.memory import machine_memory
 from pipelines.tradeoff.report import Goal, study_record, write_study

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from ground.errors import UsageError
+from ground.toml.schema import nearest
 from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
 from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
-from pipelines.toml.schema import nearest
 from pipelines.tuning.overlay import Overlay, overlaid, typical_width
 
 

@@ -5,10 +5,10 @@ import re
 
 import pytest
 
+from ground.toml.keys import keys_of
+from ground.toml.writer import toml_text
 from pipelines.assess.diagnosis.file import DiagnosisTable, HypothesisTable, Unknown, read_diagnosis
 from pipelines.scene.file import parse_scene
-from pipelines.toml.keys import keys_of
-from pipelines.toml.writer import toml_text
 from tests.docs.pages import blocks, ran
 from tests.moma.commands import answer
 from tests.paths import ROOT

@@ -12,11 +12,11 @@ from archmodel.tables.knowledge import OBSERVATIONS
 from archmodel.tables.relations import RELATIONS
 from archmodel.tables.structures import structure_kinds
 from archmodel.tables.terms import DOCUMENT_TYPES
+from ground.toml.schema import REQUIRED, Key
 from moma.cli import app
 from pipelines.record.file import read_record
 from pipelines.record.keys import ABOUT, ARRAYS, ATTRIBUTE, CITED, PROPERTY, RECORD, WHO, WITHDRAWN
 from pipelines.record.record import record
-from pipelines.toml.schema import REQUIRED, Key
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs/knowledge.md").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipelines.reports.photographs.project import read_project
+from pipelines.orient.project import read_project
 from survey.formats.reading import open_survey
 from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.control import read_control

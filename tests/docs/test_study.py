@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from ground.toml.keys import keys_of
 from pipelines.assess.study.settings import CorrelationTable, InputTable, QuantityTable, StudyTable
-from pipelines.toml.keys import keys_of
 from tests.docs.pages import blocks, ran
 from tests.paths import ROOT
 

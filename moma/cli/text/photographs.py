@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from moma.cli.text.formats import shorten
 
 if TYPE_CHECKING:
-    from pipelines.reports.photographs.orient import OrientReport
+    from pipelines.orient.orient import OrientReport
 
 
 def orient_lines(report: "OrientReport", verbose: bool) -> list[str]:

@@ -11,11 +11,11 @@ from typing import Annotated, Any
 from archmodel.store.lookalikes import explained, plain_form
 from ground.errors import SceneError
 from ground.settings import Setting
+from ground.toml.keys import Table, Texts, read_table
+from ground.toml.lines import key_lines, parse_toml, read_text
+from ground.toml.schema import TomlDocument, nearest, tables_of
+from ground.toml.writer import is_table_array
 from pipelines.scene.file import BESIDE
-from pipelines.toml.keys import Table, Texts, read_table
-from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import TomlDocument, nearest, tables_of
-from pipelines.toml.writer import is_table_array
 
 _LONGEST = 500  # characters of a formula
 _SHOWN = 60  # characters of a formula in a message

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ground.toml.writer import toml_text
 from pipelines.assess.diagnosis.dating import Dating
 from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
@@ -20,7 +21,6 @@ from pipelines.results.folder import source_of
 from pipelines.results.summary import as_json
 from pipelines.results.table_csv import inert
 from pipelines.run.record import versions
-from pipelines.toml.writer import toml_text
 from survey.quality.departures.beds import measure_beds
 from survey.quality.movement import CourseMovement, compare_courses
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from archmodel.database.session import open_database
 from ground.errors import SceneError
+from ground.toml.writer import toml_text
 from mechanics.arrays import Array
 from mechanics.dynamics.progress import Listener, Progress, silent
 from mechanics.model.model import build_model
@@ -26,7 +27,6 @@ from pipelines.run.assemble import assemble
 from pipelines.run.soundness import problems_of, refuse_unsound
 from pipelines.scene.file import parse_scene
 from pipelines.scene.fingerprint import digest
-from pipelines.toml.writer import toml_text
 from survey.quality.deformation import Deformation
 
 RECORDS = ("x", "y", "z")

@@ -9,6 +9,9 @@ import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
 from ground.errors import SceneError, UsageError
+from ground.toml.keys import read_table
+from ground.toml.lines import key_lines, parse_toml, read_text
+from ground.toml.schema import TomlDocument, nearest, tables_of
 from mechanics.arrays import Array
 from pipelines.assess.study.inputs.distributions import Distribution, correlation_root
 from pipelines.assess.study.inputs.realise import LAW_KEYS, law_value, records_of
@@ -25,9 +28,6 @@ from pipelines.assess.study.settings import (
     StudyTable,
 )
 from pipelines.scene.file import SceneFile, parse_scene
-from pipelines.toml.keys import read_table
-from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import TomlDocument, nearest, tables_of
 
 _LIMITS = (QuantityType.BOUND, QuantityType.CANDIDATE, QuantityType.HELD)
 _TABLES = ("study", "inputs", "correlations", "quantities")

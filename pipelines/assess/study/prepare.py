@@ -12,6 +12,8 @@ from sqlalchemy.orm import Session
 from archmodel.query.api import find_rows
 from archmodel.store.stone_record import StoneRecord
 from ground.errors import SceneError, UsageError
+from ground.toml.keys import build
+from ground.toml.writer import toml_text
 from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material, Orthotropy
 from pipelines.assess.kept import Kept
@@ -25,8 +27,6 @@ from pipelines.assess.workers.store import Snapshot
 from pipelines.run.record import versions
 from pipelines.scene.file import parse_scene
 from pipelines.scene.selection import Groups, StoneModel, select_groups, select_stones
-from pipelines.toml.keys import build
-from pipelines.toml.writer import toml_text
 
 _RECORDS = (StoneModel, StoneRecord, Material, Orthotropy)
 _MATERIAL: Mapping[InputType, str] = {

@@ -15,7 +15,7 @@ from pipelines.draw.elevations.orthophoto import Orthophoto, read_orthophoto
 from pipelines.draw.elevations.sheet import require_figures
 from pipelines.draw.elevations.survey import draw_departure, draw_elevation, draw_residuals
 from pipelines.draw.photographs import DrawnOutline, draw_outlines
-from pipelines.reports.photographs.page import draw_photographs, photographs_section
+from pipelines.reports.photographs import draw_photographs, photographs_section
 from pipelines.reports.survey.document import survey_json, write_survey_json
 from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys

@@ -11,6 +11,8 @@ import pytest
 from scipy import stats
 
 from ground.errors import SceneError
+from ground.toml.lines import parse_toml
+from ground.toml.writer import toml_text
 from pipelines.assess.diagnosis.dating import date_movement
 from pipelines.assess.diagnosis.file import Unknown, read_diagnosis
 from pipelines.assess.diagnosis.fit import Fit, fit
@@ -22,8 +24,6 @@ from pipelines.assess.diagnosis.trials import Trial, Tried, runner
 from pipelines.assess.kept import kept_answers
 from pipelines.assess.motions import Motions
 from pipelines.scene.file import parse_scene
-from pipelines.toml.lines import parse_toml
-from pipelines.toml.writer import toml_text
 from survey.quality.deformation import Deformation
 from survey.quality.facades import facades_of
 from survey.quality.precision import appraise

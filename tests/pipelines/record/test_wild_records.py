@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from archmodel.database.session import open_database
 from archmodel.store.stones import store_survey
 from ground.errors import MomaError
+from ground.toml.schema import REQUIRED, ValueKind
 from pipelines.record.keys import ARRAYS
 from pipelines.record.record import record
-from pipelines.toml.schema import REQUIRED, ValueKind
 from tests.archmodel.stones import SHA, box_stone
 
 NAMES = (

@@ -5,12 +5,12 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ground.toml.schema import REQUIRED, Key
 from pipelines.scene.file import MATERIAL_KEYS, MESH_KEYS, ORTHOTROPY_KEYS, SITE_KEYS, TABLES
 from pipelines.scene.laws import LAW_KEYS, LAW_TYPES
 from pipelines.scene.loads import ASSESS_TYPES, LOAD_KEYS, LOAD_TYPES, THROW_KEYS
 from pipelines.scene.pushover import PUSHOVER_KEYS, SCATTER_KEYS
 from pipelines.scene.stages import STAGE_KEYS
-from pipelines.toml.schema import REQUIRED, Key
 
 _HEAD = ("| key | unit | default | meaning |", "|---|---|---|---|")
 _HEADING = re.compile(r'(##|###) `(?:type = "(\w+)"|(\[.+\]))`')

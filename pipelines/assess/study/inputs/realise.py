@@ -11,12 +11,12 @@ import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
 from ground.errors import SceneError
+from ground.toml.writer import toml_text
 from mechanics.arrays import Array
 from pipelines.assess.study.inputs.unknowns import PLANE_PARTS, Unknown
 from pipelines.assess.study.settings import Acts, InputTable, InputType
 from pipelines.scene.file import SceneFile, parse_scene
 from pipelines.scene.selection import StoneModel
-from pipelines.toml.writer import toml_text
 
 GEOMETRY = frozenset({InputType.DEPTH, InputType.PLANE, InputType.POINT, InputType.STATION})
 """Inputs that change the shape of stones, so that joints are closed again."""

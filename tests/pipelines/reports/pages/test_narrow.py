@@ -16,8 +16,8 @@ from pipelines.results.stone_values import stone_results
 from pipelines.results.summary import summarise
 from tests.moma.commands import prints
 from tests.paths import ROOT
+from tests.pipelines.orient.test_orient import project
 from tests.pipelines.reports.pages.browser import browsing
-from tests.pipelines.reports.photographs.test_orient import project
 from tests.pipelines.reports.summaries import INPUTS, VERSIONS, assessed, pushed
 from tests.pipelines.reports.test_assessment import PIXEL
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ground.errors import MomaError, SurveyError
-from pipelines.reports.photographs.project import read_project
+from pipelines.orient.project import read_project
 from survey.orientation.formats.opencv import read_calibration
 from survey.orientation.projection import project
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ground.errors import UsageError
+from ground.toml.lines import key_lines, read_text
 from pipelines.record.file import parse_record
 from pipelines.scene.file import parse_scene
-from pipelines.toml.lines import key_lines, read_text
 
 
 def test_tables_of_an_array_have_their_own_lines():

@@ -10,7 +10,7 @@ from math import isfinite
 from typing import Any, NoReturn
 
 from ground.errors import SceneError
-from pipelines.toml.lines import Path, line_of
+from ground.toml.lines import Path, line_of
 
 
 class _Required(Enum):

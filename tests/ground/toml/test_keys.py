@@ -9,9 +9,9 @@ import pytest
 
 from ground.errors import SceneError
 from ground.settings import Setting
+from ground.toml.keys import Stones, Table, Texts, Year, build, keys_of, read_table
+from ground.toml.schema import REQUIRED, TomlDocument, ValueKind, check_table, tables_of
 from mechanics.stones.settings import check_settings
-from pipelines.toml.keys import Stones, Table, Texts, Year, build, keys_of, read_table
-from pipelines.toml.schema import REQUIRED, TomlDocument, ValueKind, check_table, tables_of
 
 
 class Colour(StrEnum):

@@ -9,7 +9,7 @@ from typing import Any
 
 from ground.errors import SurveyError, UsageError
 from pipelines.draw.elevations.sheet import require_figures
-from pipelines.reports.photographs.project import Project, calibrated, exported_control, read_project
+from pipelines.orient.project import Project, calibrated, exported_control, read_project
 from pipelines.results.folder import check_replaceable, replacing
 from survey.orientation.bundle.orient import Orientation, orient
 from survey.orientation.formats.colmap import write_colmap
@@ -88,7 +88,7 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
     UsageError, SurveyError, GeometryError
         if the project is wrong or contradicts itself; nothing is written
     """
-    from pipelines.reports.photographs.page import draw_photographs, write_photographs_page
+    from pipelines.reports.photographs import draw_photographs, write_photographs_page
 
     require_figures()
     check_replaceable(folder, INDEX)

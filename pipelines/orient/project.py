@@ -9,9 +9,9 @@ import numpy as np
 
 from ground.errors import SceneError, UsageError
 from ground.settings import Setting
-from pipelines.toml.keys import Numbers, Texts, Vector, keys_of, read_table
-from pipelines.toml.lines import key_lines, parse_toml, read_text
-from pipelines.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest, tables_of
+from ground.toml.keys import Numbers, Texts, Vector, keys_of, read_table
+from ground.toml.lines import key_lines, parse_toml, read_text
+from ground.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest, tables_of
 from survey.orientation.formats.colmap import read_colmap
 from survey.orientation.formats.control import read_control, with_control
 from survey.orientation.formats.dbat import read_dbat

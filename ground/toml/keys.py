@@ -11,8 +11,8 @@ from types import NoneType
 from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 
 from ground.settings import Setting
-from pipelines.toml.lines import Path
-from pipelines.toml.schema import REQUIRED, Key, TomlDocument, ValueKind, check_table
+from ground.toml.lines import Path
+from ground.toml.schema import REQUIRED, Key, TomlDocument, ValueKind, check_table
 
 Settings = TypeVar("Settings")
 
