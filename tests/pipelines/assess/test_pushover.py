@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipelines.assess.pushover.band import banded
-from pipelines.assess.pushover.findings import doubts_of, mechanism_of
-from tests.mechanics.limit.test_loading_test import slippery
+from ground.errors import UsageError
+from mechanics.limit.loading_test import LoadingTest
+from mechanics.scene.laws.cohesive_zone import CohesiveZone
+from mechanics.scene.laws.dry_joint import DryJoint
+from mechanics.scene.laws.elastic_joint import ElasticJoint
+from mechanics.scene.rig import Rig
+from mechanics.scene.scene import LawRule
+from pipelines.assess.pushover.band import Band, banded, varied
+from pipelines.assess.pushover.findings import doubts_of, headline_of, mechanism_of
+from pipelines.assess.pushover.push import _beside, _rig, read_curve
+from tests.mechanics.limit.test_loading_test import scene, slippery
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +72,133 @@ def test_the_gravest_doubt_comes_first(changed, disturbed, first):
     sound = {"force": np.zeros(200), "stopped": False, "unsolved": 0, "energy_error": 0.0}
     sound["calm"] = np.arange(200) >= disturbed
     assert next(iter(doubts_of(SimpleNamespace(**sound | changed))), None) == first
+
+
+RIG = Rig((1.0, 0.0, 0.0), 1.1, 40e3)
+
+
+def test_a_vertical_force_varies_in_the_rig_and_density_in_every_stone():
+    stones = scene(DryJoint(0.5))
+    same, rig = varied(stones, RIG, "load", 1.1)
+    assert (same, rig.load) == (stones, pytest.approx(44e3))
+    heavier, rig = varied(stones, RIG, "density", 0.9)
+    assert rig == RIG
+    assert [block.material.density for block in heavier.blocks] == pytest.approx([1800.0])
+
+
+def test_a_parameter_of_joints_varies_in_all_laws_that_have_it_and_changes_nothing_else():
+    springs = ElasticJoint(0.6, 1e10, 4e9, compressive_strength=2e6)
+    stones = scene(DryJoint(0.5), rules=(LawRule(frozenset({"block"}), frozenset({"block"}), springs),))
+    rubbed, rig = varied(stones, RIG, "friction", 1.2)
+    assert rig == RIG
+    assert rubbed.contact.law.friction == pytest.approx(0.6)
+    assert rubbed.contact.rules[0].law == replace(springs, friction=pytest.approx(0.72))
+    stiffer, _ = varied(stones, RIG, "stiffness", 1.5)
+    law = stiffer.contact.rules[0].law
+    assert (law.normal_stiffness, law.shear_stiffness, law.friction) == pytest.approx((1.5e10, 6e9, 0.6))
+    assert stiffer.contact.law == DryJoint(0.5)
+    crushed, _ = varied(stones, RIG, "compressive_strength", 0.5)
+    assert crushed.contact.rules[0].law == replace(springs, compressive_strength=pytest.approx(1e6))
+
+
+def test_fracture_energy_varies_with_the_strength_so_that_a_bond_softens_as_far():
+    bond = CohesiveZone(0.6, tension=1e5, energy_tension=20.0, shear=2e5, energy_shear=80.0)
+    stones = scene(bond)
+    found = varied(stones, RIG, "tension", 0.8)[0].contact.law
+    assert (found.tension, found.energy_tension) == pytest.approx((8e4, 16.0))
+    assert (found.shear, found.energy_shear) == (2e5, 80.0)
+
+
+def curve(displacement, force, inertia=None):
+    """A test with a curve by hand, in metres and newtons."""
+    places = np.array(displacement, dtype=float)
+    lost = np.zeros(len(places)) if inertia is None else np.array(inertia, dtype=float)
+    return LoadingTest(
+        places, np.array(force, dtype=float), lost, places, RIG, None, None, None, None, 0.0, 0, 0.0, False
+    )
+
+
+def test_the_headline_tells_both_strengths_the_band_and_the_mechanism():
+    test = SimpleNamespace(strength=(12340.0, -9876.0), turning=0.95)
+    assert headline_of(test, None) == "bears 12.34 kN and -9.876 kN; it rocks"
+    band = Band(0.9, np.zeros(1), np.zeros(1), np.zeros(1), 1230.0, {})
+    forwards = SimpleNamespace(strength=(12340.0, 0.0), turning=0.05)
+    assert headline_of(forwards, band) == "bears 12.34 kN ± 1.2 kN (90 % band); it slides in its joints"
+    assert headline_of(SimpleNamespace(strength=(0.0, 0.0), turning=1.0), None) == "bears nothing; it rocks"
+
+
+def test_a_measured_curve_is_read_in_millimetres_and_kilonewtons(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("displacement,force,remark\nmm,kN\n0,0\n1.5,2.5,first crack\n2.0,\n2.5,NaN\n3,2\n")
+    assert read_curve(path) == pytest.approx(np.array([[0.0, 0.0], [1.5e-3, 2.5e3], [3e-3, 2e3]]))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("0,0\n1,two\n", "no two numbers"),
+        ("displacement,force\n", "no measured points"),
+        ("1\n2\n", "no measured"),
+    ],
+)
+def test_a_measured_curve_that_says_nothing_is_refused_with_its_place(tmp_path, text, words):
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=words) as raised:
+        read_curve(path)
+    assert str(raised.value.where) == (f"{path}:2" if "two" in text else str(path))
+    with pytest.raises(UsageError, match="cannot be read"):
+        read_curve(tmp_path / "absent.csv")
+
+
+@pytest.mark.parametrize(
+    ("measured", "borne", "ratios"),
+    [
+        ([0.0, 8e3, -5e3], (10e3, -4e3), (1.25, 0.8)),
+        ([0.0, 8e3, 5e3], (10e3, -4e3), (1.25, None)),
+        ([1e3, 8e3], (0.0, 0.0), (None, None)),
+        ([-1e3, -8e3], (6e3, -6e3), (None, 0.75)),
+    ],
+)
+def test_what_was_predicted_stands_over_what_was_measured(measured, borne, ratios):
+    points = np.column_stack([np.arange(len(measured)), measured])
+    found = _beside(SimpleNamespace(strength=borne), points)
+    assert tuple(found["ratio"].values()) == pytest.approx(ratios)
+    assert found["strength"] == {"forwards": max(measured), "backwards": min(*measured, 0.0)}
+
+
+def test_the_rig_is_described_in_its_units():
+    asked = SimpleNamespace(rig=RIG, to=(0.01, -0.02), scatter={"friction": 0.15})
+    head, push, scatter = _rig(asked)
+    assert "vertical force 40 kN, pushed at 1.1 m" in head
+    assert push == "push along (1, 0, 0) to 10, -20 mm in turn"
+    assert scatter == "coefficients of variation: friction 15 %"
+    assert "no scatter" in _rig(SimpleNamespace(rig=RIG, to=(0.01,), scatter={}))[2]
+
+
+def test_secants_are_taken_where_the_curve_first_reaches_their_share_of_the_largest_force():
+    # a polygon through (1, 20), (2, 30) and (4, 100)
+    test = curve([1.0, 2.0, 4.0, 5.0], [20.0, 30.0, 100.0, 60.0])
+    assert test.early_stiffness == pytest.approx(15.0 / 0.75)
+    assert test.stiffness == pytest.approx(30.0 / 2.0)
+    assert test.secant(0.65) == pytest.approx(65.0 / 3.0)
+    backwards = curve([-1.0, -2.0, -4.0], [-20.0, -30.0, -100.0])
+    assert backwards.secant(0.65) == pytest.approx(65.0 / 3.0)
+
+
+def test_a_curve_is_that_of_its_first_branch_and_ends_there():
+    test = curve([1.0, 2.0, 1.0, -1.0, -3.0], [10.0, 40.0, 5.0, -9.0, -50.0])
+    assert test.first_branch == 2
+    assert test.at(np.array([0.5, 1.0, 1.5, 2.0])) == pytest.approx([5.0, 10.0, 25.0, 40.0])
+    assert np.isnan(test.at(np.array([2.1]))).all()
+    turned = curve([-1.0, -2.0, -1.5], [-10.0, -40.0, -5.0])
+    assert turned.first_branch == 2
+    assert turned.at(np.array([-0.5, -1.5])) == pytest.approx([-5.0, -25.0])
+    assert curve([1.0, 2.0], [10.0, 40.0]).first_branch == 2
+
+
+def test_strengths_are_the_largest_forces_of_calm_steps_each_way():
+    test = curve([1.0, 2.0, -1.0, -2.0], [40.0, 90.0, -60.0, -100.0], [0.5, 1.1, -0.9, 1.0])
+    assert test.calm.tolist() == [True, False, True, True]
+    assert test.strength == (40.0, -100.0)
+    assert curve([1.0], [10.0]).strength == (10.0, 0.0)
