@@ -92,13 +92,13 @@ def test_a_parameter_of_joints_varies_in_all_laws_that_have_it_and_changes_nothi
     rubbed, rig = varied(stones, RIG, "friction", 1.2)
     assert rig == RIG
     assert rubbed.contact.law.friction == pytest.approx(0.6)
-    assert rubbed.contact.rules[0].law == replace(springs, friction=pytest.approx(0.72))
+    assert rubbed.contact.rules[0].law == replace(springs, friction=1.2 * 0.6)
     stiffer, _ = varied(stones, RIG, "stiffness", 1.5)
     law = stiffer.contact.rules[0].law
     assert (law.normal_stiffness, law.shear_stiffness, law.friction) == pytest.approx((1.5e10, 6e9, 0.6))
     assert stiffer.contact.law == DryJoint(0.5)
     crushed, _ = varied(stones, RIG, "compressive_strength", 0.5)
-    assert crushed.contact.rules[0].law == replace(springs, compressive_strength=pytest.approx(1e6))
+    assert crushed.contact.rules[0].law == replace(springs, compressive_strength=1e6)
 
 
 def test_fracture_energy_varies_with_the_strength_so_that_a_bond_softens_as_far():
