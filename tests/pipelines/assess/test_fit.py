@@ -1,6 +1,4 @@
-"""Searches for amplitudes by hand: steps within bounds, scans where the start says nothing, and what runs leave uneven."""
-
-from types import SimpleNamespace
+"""Searches for amplitudes by hand: steps within bounds, scans where the start says nothing, and uneven runs."""
 
 import numpy as np
 import pytest
@@ -87,7 +85,6 @@ def test_a_start_whose_run_fails_is_left_by_a_scan():
     assert found.amplitudes[0] == pytest.approx(0.6)
     never, _ = searched(lambda x: "fell", SETTLEMENT)
     assert (never.trouble, never.residuals.size, never.turns) == ("fell", 0, 1)
-    assert np.isnan(never.covariance).all()
 
 
 def test_a_place_of_a_scan_must_be_better_than_the_start():
@@ -124,7 +121,7 @@ def test_runs_are_tried_on_both_sides_within_the_bounds():
 def ranked(half):
     estimate = Estimate("settlement", "m", 0.3, 0.3 - half, 0.3 + half, False)
     best = Fit((0.3,), np.zeros(2), np.zeros((1, 1)), (), 1)
-    return Ranked("settled", "settled", (), best, 4, 0.5, True, 0.0, (estimate,), ())
+    return Ranked("settled", (), best, 4, 0.5, 0.0, (estimate,), ())
 
 
 @pytest.mark.parametrize(("shift", "uneven"), [(0.0, False), (0.02, True)])
@@ -137,23 +134,18 @@ def test_what_a_parabola_leaves_of_five_runs_widens_the_interval(shift, uneven):
     }
     half = 0.03
     found = with_unevenness(ranked(half), [SETTLEMENT], answers).estimates[0]
-    # of a line through five places the slope takes -½ a + ½ b over 2.5: with a = -b the rest is 4/5 of both and 2/5 outside
-    rest = off - np.polyval(np.polyfit([-1, -0.5, 0, 0.5, 1], off, 2), [-1, -0.5, 0, 0.5, 1])
-    sigma = np.sqrt(rest @ rest / 2.0)
+    # a line takes two fifths of the shift at the ends, and a fifth between: 2 (0.4² + 0.8²) are left to two degrees
+    sigma = shift * np.sqrt(0.8)
     assert found.run_sigma == pytest.approx(sigma, abs=1e-9)
     wide = student.ppf(0.975, 4)
     assert found.high - found.value == pytest.approx(np.hypot(half, wide * sigma))
     assert found.value - found.low == pytest.approx(found.high - found.value)
     told = with_unevenness(ranked(half), [SETTLEMENT], answers).uneven
     assert bool(told) == uneven
-    assert isinstance(SimpleNamespace(), SimpleNamespace)
 
 
 def test_a_run_beside_that_fails_is_told():
     answers = dict.fromkeys(probes([SETTLEMENT], (0.3,))[0], "fell")
     found = with_unevenness(ranked(0.1), [SETTLEMENT], answers)
     assert found.remarks[-1].endswith("too narrow: fell")
-    assert (
-        found.estimates[0].run_sigma != found.estimates[0].run_sigma
-        or found.estimates == ranked(0.1).estimates
-    )
+    assert np.isnan(found.estimates[0].run_sigma)

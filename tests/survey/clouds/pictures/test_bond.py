@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from scipy.special import expit, logit
 
-from survey.clouds.pictures.bond import FEATURES, WEIGHTS, Bond, Border, bond_of, join_weak, renumbered
+from survey.clouds.pictures.bond import (
+    FEATURES,
+    LIKELY,
+    WEIGHTS,
+    Bond,
+    Border,
+    bond_of,
+    join_weak,
+    renumbered,
+)
 from survey.clouds.pictures.joints import WIDTH, Strength
 
 SHAPE = (30, 60)
@@ -150,9 +159,10 @@ def test_regions_that_were_joined_one_after_another_get_the_last_number():
     assert renumbered(np.array([[0, 1, 2, 3, 4, 5]]), bond).tolist() == [[0, 1, 1, 1, 4, 4]]
 
 
-def test_nothing_is_joined_above_the_bound():
+@pytest.mark.parametrize(("chance", "joined"), [(LIKELY + 0.01, False), (LIKELY - 0.01, True)])
+def test_a_border_that_is_likely_enough_stays(chance, joined):
     bond = gathered(HALVES)
-    join_weak(bond, least=bond.probability(1, 2))
-    assert set(bond.borders) == {1, 2}
-    join_weak(bond, least=bond.probability(1, 2) + 1e-6)
-    assert set(bond.borders) == {1}
+    bond.weights = np.zeros(len(FEATURES))
+    bond.weights[0] = logit(chance)
+    join_weak(bond)
+    assert set(bond.borders) == ({1} if joined else {1, 2})
