@@ -24,10 +24,10 @@ from pipelines.assess.motions import Motions
 from pipelines.ingest.ingest import ingest
 from pipelines.propose.propose import Recording, propose_core
 from pipelines.record.record import record
-from survey.formats.native.writer import write_moma
 from survey.quality.facades import facades_of
 from survey.quality.precision import appraise
 from synthetic.building import SyntheticBuilding
+from synthetic.formats import write_moma
 from synthetic.samples import recipe_of
 from synthetic.true_movement import true_movement
 from synthetic.write import write_sample

@@ -32,9 +32,9 @@ from benchmarks.report import (
     table_lines,
     write_between,
 )
+from benchmarks.taper import critical_slope
 from mechanics.arrays import Array
 from mechanics.planar.measures.cells import members
-from mechanics.planar.measures.taper import critical_slope
 from mechanics.planar.measures.tensors import mean_stress, moments
 from mechanics.planar.measures.tessellation import tessellation
 from pipelines.draw.elevations.sheet import new_sheet

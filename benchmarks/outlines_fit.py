@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import find_objects
 
 from benchmarks.report import progress
 from survey.arrays import Array, Bools, Ints
@@ -13,7 +14,7 @@ from survey.clouds.pictures.photograph import Photograph
 from survey.clouds.pictures.proposal import Fields, joined_regions, measured_fields
 from survey.clouds.pictures.regions import closed_regions
 from survey.clouds.pictures.scale import joint_width
-from survey.clouds.pictures.splitting import line_features, lines_across, propose_missing
+from survey.clouds.pictures.splitting import dividing_lines, line_features, propose_missing
 from survey.clouds.world import PixelPlace
 from synthetic.buildings.rendered_walls import STYLES, rasterised, render_wall
 
@@ -84,11 +85,14 @@ def _collect(
     join_weak(bond)
     regions = renumbered(regions, bond)
     borders += _samples(bond, regions, true)
-    for box, axis, whole, after, line in lines_across(regions, fields.strength, fields.hidden):
-        there = true[box] if axis else true[box].T
-        first, second = (_main(there, part) for part in (whole & ~after, after))
-        if first and second:
-            missing.append((line_features(whole, after, line), first != second))
+    for number, box in enumerate(find_objects(regions), start=1):
+        if box is None:
+            continue
+        for axis, whole, after, line in dividing_lines(regions, number, box, fields.strength, fields.hidden):
+            there = true[box] if axis else true[box].T
+            first, second = (_main(there, part) for part in (whole & ~after, after))
+            if first and second:
+                missing.append((line_features(whole, after, line), first != second))
 
 
 def _main(true: Ints, part: Bools) -> int:

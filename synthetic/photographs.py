@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import UsageError
-from pipelines.draw.offscreen.photographs import PhotographedScene
 from pipelines.draw.pictures import draw_apart
 from survey.arrays import Array
 from survey.orientation.network import Camera, Photo
@@ -22,6 +21,7 @@ from survey.orientation.projection import project
 from survey.orientation.rotations import from_angles
 from synthetic.buildings.window import WindowBay, make_window
 from synthetic.measure import inset, margin_points
+from synthetic.rendered_photographs import PhotographedScene
 
 PHOTOGRAPHED = ("photographs.toml", "marks.txt", "control.txt", "marked.moma")
 """Names of the files that are written."""
@@ -164,7 +164,7 @@ def render_photographs(folder: Path) -> None:
         }
         for camera in true_cameras(bay)
     ]
-    draw_apart("pipelines.draw.offscreen.photographs", _scene(bay, names, points), jobs)
+    draw_apart("synthetic.rendered_photographs", _scene(bay, names, points), jobs)
 
 
 def _scene(bay: WindowBay, names: list[str], points: Array) -> PhotographedScene:

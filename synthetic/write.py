@@ -10,10 +10,9 @@ from mechanics.dynamics.progress import Listener, silent
 from pipelines.samples.copy import WrittenSample, write_new
 from survey.arrays import Array
 from survey.clouds.wall import Wall, wall_lines
-from survey.formats.native.writer import write_head, write_moma
-from survey.formats.solids.obj_writer import write_obj
 from synthetic.buildings.study_files import STUDIES, study_text
 from synthetic.causes import PULSE, Cause
+from synthetic.formats import write_head, write_moma, write_obj
 from synthetic.granite_wall import GRANITE_SCENE, GRANITE_WALL, MEASURED, units, units_text
 from synthetic.photographs import PHOTOGRAPHED, PICTURES, render_photographs, write_photographs
 from synthetic.rubble_wall import (

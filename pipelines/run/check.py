@@ -12,7 +12,6 @@ from mechanics.results.forecast.cost import expected_cost, machine_slowness
 from mechanics.results.forecast.plan import Plan, plan
 from mechanics.scene.scene import Fidelity, Scene
 from mechanics.stones.meshing.quality import MeshReport
-from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.closing_pictures import draw_closing
 from pipelines.draw.elevations.closing_shapes import ClosingShapes, Stages, closing_shapes
 from pipelines.results.folder import check_replaceable, replacing, source_of
@@ -249,13 +248,6 @@ def _mesh_quality(meshes: MeshReport) -> MeshQualityReport | None:
         worst=worst.code,
         retried={stone.code: stone.failures for stone in meshes.retried},
     )
-
-
-def _pictures(scene: SceneFile, needs: Plan) -> int:
-    """Count the pictures that a run would draw."""
-    names = USUAL if scene.output.pictures is None else scene.output.pictures
-    soft = needs.bodies[Fidelity.DEFORMABLE] > 0
-    return sum(soft or PICTURES[name].shows != "stress" for name in names)
 
 
 def _cost(needs: Plan, scene: Scene, pictures: int) -> Cost:

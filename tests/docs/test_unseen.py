@@ -8,11 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from moma.cli import app
-from survey.formats.native.writer import write_moma
 from survey.unseen.core.settings import InfillSettings
 from survey.unseen.missing.settings import MissingSettings
 from synthetic.buildings.facings import two_facings
 from synthetic.buildings.window import make_window
+from synthetic.formats import write_moma
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs/unseen.md").read_text(encoding="utf-8")

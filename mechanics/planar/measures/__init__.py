@@ -3,6 +3,6 @@
 Public: `Tessellation` (tessellation); `Cell`, `layer_members`, `members`, `shape_of` (cells); `moments`, `Stress`,
 `mean_stress`, `DiskDeformation`, `deformation`, `Fabric`, `fabric_of` (tensors); `profile`, `slope`, `sides_of`
 (surface); `Blocks`, `blocks_of` (blocks); `ShearLimits`, `shear_limits`, `crest_radius` (limits); `Trishear`,
-`trishear_fit` (trishear); `TrishearGain`, `trishear_gain` (trishear_gain); `critical_slope` (taper); `Thrusts`,
+`trishear_fit` (trishear); `TrishearGain`, `trishear_gain` (trishear_gain); `Thrusts`,
 `thrusts_of` (thrusts).
 """

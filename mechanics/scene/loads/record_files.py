@@ -148,18 +148,6 @@ def read_station(
     return tuple(accelerograms)
 
 
-def read_csv(path: str | Path, unit: str | None, dt: float | None = None) -> Accelerogram:
-    """Read a table with one component; see `read_accelerogram`."""
-    accelerograms = _of_table(path, unit, dt)
-    if len(accelerograms) > 1:
-        raise SceneError(
-            f"{len(accelerograms)} components",
-            where=str(path),
-            remedy="give time, acceleration, or name it by station",
-        )
-    return accelerograms[0]
-
-
 def _of_table(path: str | Path, unit: str | None, dt: float | None) -> tuple[Accelerogram, ...]:
     """Read a table of one to four columns: times [s] if it has any, then up to three components."""
     if unit is not None and unit_of(unit) is None:

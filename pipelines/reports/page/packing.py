@@ -14,7 +14,6 @@ import struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechanics.arrays import Array
 from pipelines.reports.page.model import Column, Joints, Mechanism, Model, Motion
@@ -72,20 +71,6 @@ def pack(model: Model) -> str:
     text += b" " * (-(4 + len(text)) % 8)
     data = struct.pack("<I", len(text)) + text + b"".join(packer.parts)
     return base64.b64encode(gzip.compress(data, _LEVEL, mtime=0)).decode("ascii")
-
-
-def unpack(text: str) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-    """Return the head and the arrays of a packed model."""
-    data = gzip.decompress(base64.b64decode(text))
-    (length,) = struct.unpack("<I", data[:4])
-    head, begin = json.loads(data[4 : 4 + length]), 4 + length
-    arrays = []
-    for entry in head["arrays"]:
-        kind = np.dtype(entry["type"]).newbyteorder("<")
-        count = int(np.prod(entry["shape"], dtype=int))
-        values = np.frombuffer(data, kind, count, begin + entry["at"]).reshape(entry["shape"])
-        arrays.append(np.cumsum(values, axis=0, dtype=kind) if entry.get("delta") else values)
-    return head, arrays
 
 
 def _head(model: Model, packer: _Packer) -> dict[str, Any]:

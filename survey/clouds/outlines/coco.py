@@ -125,7 +125,7 @@ def _outlines(
             code = f"S{int(code):03d}"
         segmentation = annotation.get("segmentation")
         if isinstance(segmentation, dict):
-            mask, column = _columns(segmentation, where)
+            mask, column = mask_columns(segmentation, where)
             outline = outline_of_mask(number, mask, (column, 0), tolerance, where, attributes)
             if outline is None:
                 raise SurveyError("the mask is empty", where=where, remedy="leave it out")
@@ -162,8 +162,10 @@ def _polygon(
     )
 
 
-def run_lengths(coded: Mapping[str, Any], where: str = "") -> NDArray[np.bool_]:
-    """Decode a mask of run lengths, plain or compressed.
+def mask_columns(coded: Mapping[str, Any], where: str) -> tuple[NDArray[np.bool_], int]:
+    """Decode a mask of run lengths, plain or compressed: its columns with pixels, and the number of the first.
+
+    A picture has thousands of others.
 
     Parameters
     ----------
@@ -177,17 +179,10 @@ def run_lengths(coded: Mapping[str, Any], where: str = "") -> NDArray[np.bool_]:
 
     Examples
     --------
-    >>> run_lengths({"size": [2, 3], "counts": [1, 2, 3]}).astype(int).tolist()
-    [[0, 1, 0], [1, 0, 0]]
+    >>> columns, first = mask_columns({"size": [2, 3], "counts": [1, 2, 3]}, "")
+    >>> columns.astype(int).tolist(), first
+    ([[0, 1], [1, 0]], 0)
     """
-    mask, first = _columns(coded, where)
-    whole = np.zeros([int(one) for one in coded["size"]], dtype=np.bool_)
-    whole[:, first : first + mask.shape[1]] = mask
-    return whole
-
-
-def _columns(coded: Mapping[str, Any], where: str) -> tuple[NDArray[np.bool_], int]:
-    """Decode the columns of a mask from the first to the last that it has pixels in; a picture has thousands."""
     try:
         height, width = (int(one) for one in coded["size"])
         counts = coded["counts"]

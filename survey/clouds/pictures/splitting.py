@@ -71,7 +71,7 @@ def propose_missing(
     while waiting:
         number, box = waiting.pop()
         best: tuple[float, Bools] | None = None
-        for axis, whole, after, line in _lines(out, number, box, strength, hidden):
+        for axis, whole, after, line in dividing_lines(out, number, box, strength, hidden):
             chance = float(expit(line_features(whole, after, line) @ np.array(weights)))
             if chance >= least and (best is None or chance > best[0]):
                 best = chance, after if axis else after.T
@@ -83,24 +83,7 @@ def propose_missing(
     return out
 
 
-def lines_across(
-    regions: Ints, strength: Strength, hidden: Bools
-) -> Iterator[tuple[tuple[slice, ...], int, Bools, Bools, Line]]:
-    """Yield the best lines across all regions: the box of the region, the axis, and both as `_lines` does.
-
-    Parameters
-    ----------
-    regions, strength, hidden : as for `propose_missing`
-    """
-    from scipy.ndimage import find_objects
-
-    for number, box in enumerate(find_objects(regions), start=1):
-        if box is not None:
-            for axis, whole, after, line in _lines(regions, number, box, strength, hidden):
-                yield box, axis, whole, after, line
-
-
-def _lines(
+def dividing_lines(
     regions: Ints, number: int, box: tuple[slice, ...], strength: Strength, hidden: Bools
 ) -> Iterator[tuple[int, Bools, Bools, Line]]:
     """Yield the axis, the region, the part beyond and the line: upright (1) and level (0, transposed)."""

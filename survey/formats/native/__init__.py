@@ -1,4 +1,4 @@
-"""The native survey format (`.moma`): reader and writer.
+"""The native survey format (`.moma`).
 
-Public: `open_moma`, `read_moma`, `read_head`, `with_header` (reader); `write_head`, `write_moma` (writer).
+Public: `open_moma`, `read_moma`, `read_head`, `with_header` (reader).
 """

@@ -44,9 +44,11 @@ from ground.tables.text_lines import TextLines
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import HeadReader
 from survey.formats.native.stone import STONE_WORDS, StoneReader
-from survey.formats.native.writer import MAGIC
 from survey.formats.options import ReadingOptions, whole
 from survey.records.survey import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
+
+MAGIC = "moma-survey 1"
+"""First line of the format."""
 
 
 def open_moma(path: Path, options: ReadingOptions | None = None) -> SurveyStream:

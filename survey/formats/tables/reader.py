@@ -23,7 +23,7 @@ from ground.tables.decimals import Decimals
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
 from survey.formats.fields import CODE, KIND, NO_COURSE, NUMBERED_ANEW, code_of, parse_course
-from survey.formats.options import ReadingOptions, whole
+from survey.formats.options import ReadingOptions
 from survey.formats.tables.axes import (
     ORDERS,
     AxisEvidence,
@@ -46,7 +46,7 @@ from survey.formats.tables.kinds import kind_of, meant
 from survey.formats.tables.point_table import PointTable, TableStone, check_station
 from survey.formats.tables.roles import CONTROL, STATION, is_bare, role_of, roles_with
 from survey.formats.tables.wkt import outline_of
-from survey.records.survey import DEPTH_ORIGINS, Station, Survey, SurveyHead, SurveyStream
+from survey.records.survey import DEPTH_ORIGINS, Station, SurveyHead, SurveyStream
 
 CODES = "{block}:{role}"
 """Template of descriptions, if none is given."""
@@ -135,22 +135,6 @@ def open_pnezd(path: Path, options: ReadingOptions | None = None) -> SurveyStrea
 def open_penzd(path: Path, options: ReadingOptions | None = None) -> SurveyStream:
     """Read a list of point, easting, northing, elevation, description, otherwise as `open_csv`."""
     return _open_list(Path(path), options or ReadingOptions(), "penzd")
-
-
-def read_csv(path: Path, default_sigma: float = 0.003) -> Survey:
-    """Read a table of points as a whole.
-
-    Parameters
-    ----------
-    path : the file
-    default_sigma : standard deviation of a coordinate whose row states none [m]
-
-    Raises
-    ------
-    SurveyError
-        naming file and line, when any row is wrong
-    """
-    return whole(open_csv(path, ReadingOptions(sigma=default_sigma)), Path(path))
 
 
 def _open_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream:

@@ -172,18 +172,6 @@ def network_of(
     )
 
 
-def write_marks(network: Network, path: Path) -> None:
-    """Write the marks of a network with all digits; of unequal deviations of x and y, the root mean square."""
-    text = ["# photograph, point, x, y, sigma [px]"]
-    for k in range(len(network.photo)):
-        x, y = network.image[k].tolist()
-        sigma = float(np.sqrt((network.sigma[k] ** 2).mean()))
-        text.append(
-            f"{network.photos[network.photo[k]].name}, {network.names[network.point[k]]}, {x!r}, {y!r}, {sigma!r}"
-        )
-    path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")
-
-
 def numbered(network: Network, table: Path) -> tuple[str, ...]:
     """Return numbers for the points of a network, for formats in which they have no names.
 

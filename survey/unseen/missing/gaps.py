@@ -12,7 +12,6 @@ from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line
 
 _UP, _DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
-_LEVEL = np.array([1.0, 0.0])
 _AROUND = 4  # stones of the course that define the beds beside a gap
 _SAME_BED = 0.05  # metres: largest distance of ends of stones from one bed
 _BEYOND = 0.05  # metres above and below a gap at which stones are sought

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from survey.formats.native.writer import write_head, write_moma
-from survey.formats.solids.obj_writer import write_obj
 from synthetic.buildings.facings import two_facings
 from synthetic.buildings.ribs import RibVaultShape, rib_vault
 from synthetic.buildings.window import make_window
+from synthetic.formats import write_head, write_moma, write_obj
 from tests.moma.commands import answer, fails, invoke, prints
 
 

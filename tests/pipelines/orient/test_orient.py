@@ -9,11 +9,16 @@ from PIL import Image
 
 from survey.orientation.formats.colmap import read_colmap
 from survey.orientation.formats.control import ControlRow, write_control
-from survey.orientation.formats.marks import write_marks
 from survey.orientation.formats.metashape import read_metashape
 from survey.orientation.formats.photomodeler import write_photomodeler
 from tests.moma.commands import answer, fails, prints
-from tests.survey.orientation.synthetic_block import noisy, spread_points, wall_block, with_points
+from tests.survey.orientation.synthetic_block import (
+    noisy,
+    spread_points,
+    wall_block,
+    with_points,
+    write_marks,
+)
 
 PROJECT = """\
 marks = "marks.txt"

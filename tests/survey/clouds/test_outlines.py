@@ -8,7 +8,7 @@ from PIL import Image
 
 from ground.errors import SurveyError, UsageError
 from survey.clouds.masks import open_masks
-from survey.clouds.outlines.coco import run_lengths
+from survey.clouds.outlines.coco import mask_columns
 from survey.clouds.outlines.labels import read_labels
 from survey.clouds.outlines.outline import attributes_of, field_map, made_code
 from survey.clouds.outlines.reading import read_outlines
@@ -248,9 +248,13 @@ def test_run_lengths_come_back():
     rng = np.random.default_rng(3)
     for _ in range(50):
         mask = rng.random((17, 23)) < rng.uniform(0.02, 0.98)
-        assert (run_lengths({"size": [17, 23], "counts": compressed(mask)}) == mask).all()
+        columns, first = mask_columns({"size": [17, 23], "counts": compressed(mask)}, "")
+        last = first + columns.shape[1]
+        assert (columns == mask[:, first:last]).all()
+        assert not mask[:, :first].any()
+        assert not mask[:, last:].any()
     with pytest.raises(SurveyError, match="run lengths of 5 pixels for a picture of 3 × 2"):
-        run_lengths({"size": [2, 3], "counts": [2, 3]})
+        mask_columns({"size": [2, 3], "counts": [2, 3]}, "")
 
 
 def coco(kind):

@@ -108,3 +108,15 @@ def spread_points(truth, count):
         far = np.min(np.linalg.norm(place[:, None] - place[found][None], axis=2), axis=1)
         found.append(int(np.argmax(far)))
     return found
+
+
+def write_marks(network, path):
+    """Write the marks of a network with all digits; of unequal deviations of x and y, the root mean square."""
+    text = ["# photograph, point, x, y, sigma [px]"]
+    for k in range(len(network.photo)):
+        x, y = network.image[k].tolist()
+        sigma = float(np.sqrt((network.sigma[k] ** 2).mean()))
+        text.append(
+            f"{network.photos[network.photo[k]].name}, {network.names[network.point[k]]}, {x!r}, {y!r}, {sigma!r}"
+        )
+    path.write_text("\n".join([*text, ""]), encoding="utf-8", newline="\n")

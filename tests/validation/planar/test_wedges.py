@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.planar.measures.taper import critical_slope
+from benchmarks.taper import critical_slope
 from pipelines.geology.run import run_geology
 from tests.paths import ROOT
 

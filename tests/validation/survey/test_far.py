@@ -19,12 +19,12 @@ from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.faces import outline_face
 from survey.formats.native.reader import read_moma
-from survey.formats.native.writer import write_moma
 from survey.formats.reading import open_survey
 from survey.geometry.watertight import check_watertight
 from survey.joints.close import close_joints
 from survey.records.survey import ControlPoint, Survey
 from survey.registration.stones import survey_stones
+from synthetic.formats import write_moma
 from tests.paths import ROOT
 
 SAMPLE = ROOT / "data" / "samples" / "window" / "window.moma"

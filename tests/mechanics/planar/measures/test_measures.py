@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.taper import critical_slope
 from ground.errors import SceneError
 from mechanics.planar.measures.blocks import blocks_of
 from mechanics.planar.measures.cells import Cell, members, shape_of
 from mechanics.planar.measures.limits import crest_radius, shear_limits
 from mechanics.planar.measures.surface import profile, slope
-from mechanics.planar.measures.taper import critical_slope
 from mechanics.planar.measures.tensors import deformation, fabric_of, mean_stress, moments
 from mechanics.planar.measures.tessellation import tessellation
 from mechanics.planar.measures.thrusts import thrusts_of

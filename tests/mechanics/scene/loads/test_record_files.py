@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ground.errors import SceneError
-from mechanics.scene.loads.record_files import read_accelerogram, read_accelerograms, read_csv
+from mechanics.scene.loads.record_files import read_accelerogram, read_accelerograms
 from mechanics.scene.loads.record_formats import read_at2
 
 ACCELERATION = 0.1 * np.sin(np.arange(12) / 2.0)  # [g]
@@ -115,7 +115,7 @@ def test_a_table_is_read_in_its_unit(tmp_path, unit, factor, separator):
 def test_a_table_needs_no_header_and_may_round_its_times(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("\n".join(f"{i / 30:.3f},{a}" for i, a in enumerate(ACCELERATION)))
-    assert read_csv(path, "g").dt == pytest.approx(1 / 30, rel=1e-2)
+    assert read_accelerogram(path, "g").dt == pytest.approx(1 / 30, rel=1e-2)
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_table_needs_no_header_and_may_round_its_times(tmp_path):
 def test_a_malformed_table_is_refused_with_its_line(tmp_path, text, line, said):
     path = tmp_path / "bad.csv"
     path.write_text(text)
-    message = message_of(read_csv, path, "g")
+    message = message_of(read_accelerogram, path, "g")
     assert message.startswith(f"{path}:{line}: ")
     assert said in message
 
@@ -141,14 +141,14 @@ def test_a_malformed_table_is_refused_with_its_line(tmp_path, text, line, said):
 def test_a_table_without_rows_unit_or_file_is_refused(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("time,a\n0.0,1.0\n")
-    assert "1 rows of numbers" in message_of(read_csv, path, "g")
+    assert "1 rows of numbers" in message_of(read_accelerogram, path, "g")
     path.write_text("time,a\n0.0,1.0\n0.1,1.0\n")
     assert "the unit of the acceleration is not known; give g, m/s2, cm/s2, gal, mm/s2, %g" in message_of(
         read_accelerogram, path
     )
-    assert "unknown unit 'furlong'" in message_of(read_csv, path, "furlong")
+    assert "unknown unit 'furlong'" in message_of(read_accelerogram, path, "furlong")
     assert "no such file; check the path" in message_of(read_at2, tmp_path / "none.AT2")
-    assert "cannot be read" in message_of(read_csv, tmp_path, "g")
+    assert "cannot be read" in message_of(read_accelerogram, tmp_path, "g")
 
 
 ROWS = "   0.000   0.114   0.245   0.394   0.558\n" * 20

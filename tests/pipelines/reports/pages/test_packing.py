@@ -1,6 +1,10 @@
 """What is packed comes back: places to their step, poses to a part in 32,767, texts as they are; pages stay small."""
 
+import base64
+import gzip
+import json
 import re
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +14,23 @@ from scipy.spatial.transform import Rotation
 from mechanics.scene.shapes import BOX_FACES, box_corners
 from pipelines.reports.page.inline import MODULES, module_text, script
 from pipelines.reports.page.model import Column
-from pipelines.reports.page.packing import pack, unpack
+from pipelines.reports.page.packing import pack
 from pipelines.reports.page.surfaces import rigid_motion, stones_of
 from tests.pipelines.reports.pages.models import wall_model
+
+
+def unpack(text):
+    """Return the head and the arrays of a packed model."""
+    data = gzip.decompress(base64.b64decode(text))
+    (length,) = struct.unpack("<I", data[:4])
+    head, begin = json.loads(data[4 : 4 + length]), 4 + length
+    arrays = []
+    for entry in head["arrays"]:
+        kind = np.dtype(entry["type"]).newbyteorder("<")
+        count = int(np.prod(entry["shape"], dtype=int))
+        values = np.frombuffer(data, kind, count, begin + entry["at"]).reshape(entry["shape"])
+        arrays.append(np.cumsum(values, axis=0, dtype=kind) if entry.get("delta") else values)
+    return head, arrays
 
 
 def series(head, arrays, one):

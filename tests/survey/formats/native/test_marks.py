@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from survey.formats.native.reader import open_moma, read_moma
-from survey.formats.native.writer import write_moma
 from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.result import orientation_values, write_orientation
 from survey.orientation.projection import project
 from survey.records.survey import Reject
 from survey.registration.stones import survey_stones
+from synthetic.formats import write_moma
 from tests.survey.orientation.synthetic_block import noisy, spread_points, wall_block, with_points
 
 HEAD = "moma-survey 1\norientation orientation.json\ndepth * 0.4 source guess\n{more}\n"

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from ground.errors import SurveyError, UsageError
 from survey.formats.native.reader import open_moma, read_head, read_moma, with_header
-from survey.formats.native.writer import write_moma
 from survey.formats.options import ReadingOptions
 from survey.records.survey import (
     OBSERVER,
@@ -26,6 +25,7 @@ from survey.records.survey import (
     Survey,
     SurveyHead,
 )
+from synthetic.formats import write_moma
 from tests.paths import ROOT
 from tests.survey.formats.survey_files import MOMA
 

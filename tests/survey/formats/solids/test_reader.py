@@ -8,16 +8,15 @@ import trimesh
 
 from ground.errors import MomaError, SurveyError, UsageError
 from survey.formats.native.reader import read_head
-from survey.formats.native.writer import write_head
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.formats.solids.msh.sections import MshFile
-from survey.formats.solids.obj_writer import write_obj
 from survey.formats.solids.reader import open_solids
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight, triangulate
 from survey.records.survey import Reject, SolidRecord
 from synthetic.buildings.ribs import RibVaultShape, rib_vault
+from synthetic.formats import write_head, write_obj
 from tests.survey.formats.survey_files import EXAMPLES, SQUARES, moved
 
 SOLIDS = [name for name, one in EXAMPLES.items() if one.format == "solids"]

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from ground.errors import SurveyError
-from survey.formats.options import ReadingOptions
-from survey.formats.tables.reader import open_csv, read_csv
+from survey.formats.options import ReadingOptions, whole
+from survey.formats.tables.reader import open_csv
 from survey.records.survey import BlockRecord, Reject, Station, Survey, SurveyHead
 
 HEAD = "block,kind,course,role,x,y,z\n"
@@ -17,6 +17,10 @@ def write(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "wall.csv"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def read_csv(path: Path, sigma: float = 0.003) -> Survey:
+    return whole(open_csv(path, ReadingOptions(sigma=sigma)), path)
 
 
 def test_the_sample_written_as_a_table_is_the_same_survey(tmp_path: Path, survey: Survey) -> None:
@@ -100,7 +104,7 @@ def test_tables_of_all_lands_say_the_same(tmp_path: Path, separator: str, mark: 
     text = "# Besançon\r\n\r\n" + "\r\n".join(separator.join(map(field, row)) for row in rows)
     path = tmp_path / "wall.csv"
     path.write_bytes(text.encode(encoding))
-    (block,) = read_csv(path, default_sigma=0.002).blocks
+    (block,) = read_csv(path, sigma=0.002).blocks
     assert block.vertices.tolist() == [[0.25, 0.0, 0.1], [1.25, 0.0, 0.0], [1.25, 0.0, 1.75]]
     assert block.points.tolist() == [[1.25, -0.5, 1.0]]
     assert (block.depth, block.depth_sigma, block.depth_source) == (0.5, 0.01, "Ségur, p. 3")

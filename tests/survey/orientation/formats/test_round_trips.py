@@ -11,14 +11,20 @@ from survey.orientation.bundle.orient import orient
 from survey.orientation.formats.colmap import read_colmap, write_colmap
 from survey.orientation.formats.control import read_control, with_control, write_control
 from survey.orientation.formats.dbat import read_dbat, write_dbat
-from survey.orientation.formats.marks import network_of, read_marks, write_marks
+from survey.orientation.formats.marks import network_of, read_marks
 from survey.orientation.formats.metashape import read_metashape, write_metashape
 from survey.orientation.formats.photomodeler import read_photomodeler, write_photomodeler
 from survey.orientation.formats.result import orientation_values, read_orientation, write_orientation
 from survey.orientation.network import INTERIOR
 from survey.orientation.projection import project
 from survey.orientation.rotations import angles
-from tests.survey.orientation.synthetic_block import noisy, spread_points, wall_block, with_points
+from tests.survey.orientation.synthetic_block import (
+    noisy,
+    spread_points,
+    wall_block,
+    with_points,
+    write_marks,
+)
 
 NEAR = 1e-9  # [m], [px]
 

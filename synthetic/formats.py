@@ -1,12 +1,13 @@
-"""Writer of the native survey format, the inverse of `survey.formats.native.reader`."""
+"""Writers of surveys: the native format, as `survey.formats.native.reader` reads it back, and closed solids as OBJ."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ground.errors import SurveyError
 from ground.tables.numbers import FARTHEST
 from survey.formats.fields import CODE
+from survey.formats.native.reader import MAGIC
 from survey.records.survey import (
     OBSERVER,
     BlockRecord,
@@ -14,11 +15,10 @@ from survey.records.survey import (
     DepthRule,
     Extrusion,
     Photograph,
+    SolidRecord,
     Survey,
     SurveyHead,
 )
-
-MAGIC = "moma-survey 1"
 
 
 def write_moma(survey: Survey, path: Path) -> None:
@@ -206,3 +206,20 @@ def _key(text: str) -> str:
     if not text or not text.isprintable() or " " in text:
         raise SurveyError(f"note {text[:60]!r} cannot be written", remedy="give a note one word as its key")
     return text
+
+
+def write_obj(solids: Sequence[SolidRecord], path: Path) -> None:
+    """Write solids that are read back equal to the last bit; objects are named CODE:KIND.
+
+    Parameters
+    ----------
+    solids : the stones, whose courses are left out
+    path : the file; it is replaced
+    """
+    lines, before = [], 1
+    for solid in solids:
+        lines.append(f"o {solid.code}:{solid.kind}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in solid.vertices.tolist()]
+        lines += ["f " + " ".join(str(before + corner) for corner in face) for face in solid.faces]
+        before += len(solid.vertices)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
