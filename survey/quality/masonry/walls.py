@@ -98,7 +98,7 @@ class MasonryQuality:
     area : of its faces [m²]
     trace, trace_sigma : line of minimum trace on the face over the straight distance, its median over the wall [-];
         None if the wall is too low
-    section : the same in sections through the wall; None if the opposite face was not surveyed
+    section, section_sigma : the same in sections through the wall; None if the opposite face was not surveyed
     headers : per square metre; None if the survey does not tell headers from stretchers
     grades : of each parameter
     indices : lowest and highest masonry quality index of each direction, as the survey allows
@@ -111,6 +111,7 @@ class MasonryQuality:
     trace: float | None
     trace_sigma: float | None
     section: float | None
+    section_sigma: float | None
     headers: float | None
     grades: Mapping[Parameter, Grade]
     indices: Mapping[Direction, tuple[float, float]]
@@ -197,6 +198,7 @@ def _judge(
         trace,
         trace_sigma,
         section,
+        section_sigma,
         headers,
         grades,
         indices,
