@@ -142,7 +142,7 @@ def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldL
             unit = _unit(load)
             low, high = round(carried / unit), round(load / unit)
             tried = {0: nothing, low: best, high: trial}
-            search = _Search(steps, unit, tried)
+            search = _Search(steps, unit, dict(tried))
             limit = _lasting(on, steps, search, search.limit(on, low, high, None))
             return replace(limit, problems=problems + limit.problems - len(tried))
         carried, best, load = load, trial, 2.0 * load

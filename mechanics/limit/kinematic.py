@@ -28,7 +28,7 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.limit_load import LimitLoad, Mechanism
 from mechanics.limit.live_loads import Acceleration
 
-# speed over the fastest below which a stone stands [-]
+# speed over the fastest below which a stone stands, or does not turn [-]
 _STANDS = 1e-3
 # difference of the motions of two stones at their centres, over the fastest, up to which they are one block [-]
 _SAME_MOTION = 1e-3
@@ -89,7 +89,9 @@ def kinematics(on: RigidAssembly, live: Acceleration, limit: LimitLoad) -> Kinem
         members = np.flatnonzero(block == number)
         centre[number] = on.model.mass[members] @ on.state.centre[members] / on.model.mass[members].sum()
         first = members[np.argmax(on.model.mass[members])]
-        spin[number] = limit.mechanism.velocity[first, 3:]
+        turning = limit.mechanism.velocity[first, 3:]
+        if 0.5 * on.model.surfaces.size[first] * np.linalg.norm(turning) > _STANDS:
+            spin[number] = turning
         arm = centre[number] - on.state.centre[first]
         velocity[number] = limit.mechanism.velocity[first, :3] + np.cross(spin[number], arm)
     along = velocity @ direction

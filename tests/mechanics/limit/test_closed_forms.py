@@ -1,0 +1,415 @@
+"""Limit states of one and two blocks by formulas: planes that tilt, towers, wedges, thinned joints, oscillators."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ground.errors import SceneError
+from mechanics.dynamics.outcome import Outcome
+from mechanics.limit import confirm as confirm_module
+from mechanics.limit import held
+from mechanics.limit.assembly import assembly
+from mechanics.limit.confirm import ConfirmationRun, confirm, likeness
+from mechanics.limit.joints import resultants, stress_blocks
+from mechanics.limit.kinematic import kinematics
+from mechanics.limit.limit_load import Flow, Mechanism, limit_load, mechanism
+from mechanics.limit.live_loads import Acceleration, PointForce, SpreadForce, levers
+from mechanics.limit.loading_test import JawPath
+from mechanics.limit.pushover import _Run
+from mechanics.limit.thickness import geometric_safety
+from mechanics.limit.thrust import thrust
+from mechanics.scene.scene import Block, Fidelity
+from tests.mechanics.shapes import BOX_FACES, LIMESTONE, brick, ground, scene
+
+X = Acceleration((1.0, 0.0, 0.0))
+EXACT = 1e-6  # of λ: programmes leave 10⁻⁹
+
+
+def on_plane(stone, degrees, friction, ground_=None):
+    """A stone on a plane that leans: gravity leans instead, so that it pulls along x."""
+    lean = np.radians(degrees)
+    pull = (9.81 * np.sin(lean), 0.0, -9.81 * np.cos(lean))
+    return assembly(scene(ground_ or ground(), stone, gravity=pull, friction=friction))
+
+
+def along(on, load, flow=Flow.ASSOCIATIVE):
+    return limit_load(on, load, flow).multiplier
+
+
+SQUAT, TALL = brick("a", (0, 0, 0), (1.0, 1.0, 0.5)), brick("a", (0, 0, 0), (0.4, 0.6, 1.6))
+
+
+@pytest.mark.parametrize("flow", list(Flow))
+@pytest.mark.parametrize(("degrees", "downwards"), [(10.0, True), (10.0, False), (25.0, True), (0.0, True)])
+def test_a_block_on_a_plane_slides_where_the_push_reaches_its_cone_of_friction(degrees, downwards, flow):
+    """λ along the plane, in units of gravity: μ cos β ∓ sin β."""
+    lean, on = np.radians(degrees), on_plane(SQUAT, degrees, 0.6)
+    push = Acceleration((1.0 if downwards else -1.0, 0.0, 0.0))
+    exact = 0.6 * np.cos(lean) - (1.0 if downwards else -1.0) * np.sin(lean)
+    assert along(on, push, flow) == pytest.approx(exact, rel=EXACT if flow is Flow.ASSOCIATIVE else 1e-2)
+
+
+@pytest.mark.parametrize(("degrees", "downwards"), [(5.0, True), (5.0, False), (12.0, True)])
+def test_a_slender_block_on_a_plane_tips_about_its_lower_edge(degrees, downwards):
+    """b/h cos β ∓ sin β."""
+    lean, on = np.radians(degrees), on_plane(TALL, degrees, 0.9)
+    push = Acceleration((1.0 if downwards else -1.0, 0.0, 0.0))
+    exact = 0.25 * np.cos(lean) - (1.0 if downwards else -1.0) * np.sin(lean)
+    assert along(on, push) == pytest.approx(exact, rel=EXACT)
+
+
+@pytest.mark.parametrize(("degrees", "stands"), [(30.9, True), (31.1, False)])
+def test_a_plane_steeper_than_the_angle_of_friction_holds_nothing(degrees, stands):
+    """μ = 0.6 is 30.96 degrees."""
+    found = limit_load(on_plane(SQUAT, degrees, 0.6), X)
+    assert (found.multiplier > 0.0) == stands
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "friction", "exact"),
+    [
+        # both tip as one: half a width of 0.6 over half a height of 1.6
+        ((0.6, 0.8), (0.6, 0.8), 0.9, 0.375),
+        # the upper tips alone: 0.3 over 0.8
+        ((1.0, 0.4), (0.3, 0.8), 0.9, 0.375),
+        # the upper slides before it tips, and both before they tip
+        ((1.0, 0.4), (0.8, 0.4), 0.4, 0.4),
+        # a heavy foot with a narrow tower: both about the foot's edge, or the tower alone
+        (
+            (0.5, 0.2),
+            (0.4, 1.6),
+            0.9,
+            min(0.25, (0.5 * 0.2 * 0.25 + 0.4 * 1.6 * 0.25) / (0.1 * 0.1 + 0.64 * 1.0)),
+        ),
+        # the foot is so narrow that both tip about it first
+        ((0.3, 0.8), (0.9, 0.8), 0.9, (0.24 + 0.72) * 0.15 / (0.24 * 0.4 + 0.72 * 1.2)),
+    ],
+)
+def test_a_tower_of_two_stones_falls_at_its_weakest_joint(lower, upper, friction, exact):
+    foot = brick("foot", (-0.5 * lower[0], 0, 0), (0.5 * lower[0], 1.0, lower[1]))
+    head = brick("head", (-0.5 * upper[0], 0, lower[1]), (0.5 * upper[0], 1.0, lower[1] + upper[1]))
+    on = assembly(scene(ground((-3, -3, -1)), foot, head, friction=friction))
+    assert along(on, X) == pytest.approx(exact, rel=EXACT)
+    # pushed on its head alone, each joint has only that push
+    alone = Acceleration((1.0, 0.0, 0.0), frozenset({"head"}))
+    weight = np.array([lower[0] * lower[1], upper[0] * upper[1]])
+    slides = min(friction * weight.sum() / weight[1], friction)
+    tips = min(upper[0] / upper[1], 0.5 * lower[0] * weight.sum() / (weight[1] * (lower[1] + 0.5 * upper[1])))
+    assert along(on, alone) == pytest.approx(min(slides, tips), rel=EXACT)
+
+
+@pytest.mark.parametrize(("height", "exact"), [(0.1, 0.6), (0.5, 0.4), (1.6, 0.125), (None, 0.25)])
+def test_a_force_at_a_height_slides_a_block_or_tips_it(height, exact):
+    """μ W, or half of W b over the height; without a place it acts at the centre."""
+    on = assembly(scene(ground(), TALL, friction=0.6))
+    at = None if height is None else (0.2, 0.3, height)
+    push = PointForce("a", (0.5 * on.weight, 0.0, 0.0), at)
+    assert along(on, push) == pytest.approx(2.0 * exact, rel=EXACT)
+    assert str(push) == f"force on a, in units of {0.5 * on.weight:g} N"
+
+
+def test_a_force_is_spread_over_stones_as_their_weight_is():
+    light, heavy = brick("a", (0, 0, 0), (1, 1, 0.5)), brick("b", (1.5, 0, 0), (2.5, 1, 1.5))
+    on = assembly(scene(ground(), light, heavy))
+    load = SpreadForce(frozenset({"a", "b"}), (8.0, 0.0, -4.0))(on).reshape(-1, 6)
+    assert load[:, :3] == pytest.approx(np.array([[2.0, 0.0, -1.0], [6.0, 0.0, -3.0]]))
+    assert not load[:, 3:].any()
+    with pytest.raises(SceneError, match="not all zero"):
+        SpreadForce(frozenset({"a"}), (0.0, 0.0, 0.0))(on)
+    with pytest.raises(SceneError, match="ground is fixed"):
+        SpreadForce(frozenset({"ground"}), (1.0, 0.0, 0.0))(on)
+
+
+def test_an_acceleration_is_a_part_of_gravity_and_some_stones_have_it_as_forces():
+    on = assembly(scene(ground(), SQUAT))
+    assert Acceleration((0.0, 2.0, 0.0)).applied(on, 0.3).gravity == pytest.approx((0.0, 0.3 * 9.81, -9.81))
+    some = Acceleration((0.0, 2.0, 0.0), frozenset({"a"})).applied(on, 0.3)
+    assert some.gravity == (0.0, 0.0, -9.81)
+    (force,) = some.loads.forces
+    assert force.stones == frozenset({"a"})
+    for direction in ((0.0, 0.0, 0.0), (np.nan, 0.0, 1.0)):
+        with pytest.raises(SceneError, match="direction"):
+            Acceleration(direction)
+
+
+def test_a_force_and_its_moment_act_at_the_nearest_place_to_the_centre():
+    arm, force = np.array([0.2, 0.0, 0.7]), np.array([0.0, 3.0, 0.0])
+    load = np.array([np.zeros(6), np.concatenate([force, np.cross(arm, force)])])
+    rows, found, place = levers(load)
+    assert (rows.tolist(), found[0].tolist()) == ([1], force.tolist())
+    assert place[0] == pytest.approx(arm)
+
+
+def wedge(slope):
+    """A wedge with a width of 1 m at its foot, 2 m at its top and faces that lean from upright, between two others."""
+    side = np.tan(np.radians(slope))
+    low = np.array([[-0.5, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [-0.5, 1, 0]])
+    high = np.array([[-0.5 - side, 0, 1], [0.5 + side, 0, 1], [0.5 + side, 1, 1], [-0.5 - side, 1, 1]])
+
+    def prism(code, foot, head, fidelity):
+        return Block(code, np.vstack([foot, head]), BOX_FACES, LIMESTONE, fidelity)
+
+    def beside(sign):
+        bottom, top = low.copy(), high.copy()
+        inner, outer = ((1, 2), (0, 3)) if sign < 0 else ((0, 3), (1, 2))
+        bottom[list(inner), 0], top[list(inner), 0] = sign * 0.5, sign * (0.5 + side)
+        bottom[list(outer), 0] = top[list(outer), 0] = sign * 4.0
+        return prism("left" if sign < 0 else "right", bottom, top, Fidelity.FIXED)
+
+    return beside(-1), prism("wedge", low, high, Fidelity.RIGID), beside(1)
+
+
+@pytest.mark.parametrize(("slope", "friction"), [(30.0, 0.0), (30.0, 0.2), (20.0, 0.3)])
+def test_a_wedge_pushes_its_supports_apart_between_both_ends_of_friction(slope, friction):
+    """H = W/2 cot(β ± φ): the faces push along their normals, which lie below the level by β."""
+    on = assembly(scene(*wedge(slope), friction=friction))
+    angle, phi = np.radians(slope), np.arctan(friction)
+    least = 0.5 / np.tan(angle + phi)
+    greatest = 0.5 / np.tan(angle - phi) if angle > phi else np.inf
+    found = thrust(on, ["right"], (2.0, 0.0, 0.0))
+    assert found.direction == (1.0, 0.0, 0.0)
+    assert found.least.value / on.weight == pytest.approx(least, rel=1e-5)
+    assert found.greatest.value / on.weight == pytest.approx(greatest, rel=1e-5)
+    assert thrust(on, ["left"], (-1.0, 0.0, 0.0)).least.value == pytest.approx(found.least.value, rel=1e-5)
+
+
+def test_a_wedge_between_faces_steeper_than_friction_locks():
+    found = thrust(assembly(scene(*wedge(10.0), friction=0.3)), ["right"], (1.0, 0.0, 0.0))
+    assert found.greatest.value == np.inf
+
+
+def test_what_gives_no_thrust_is_refused():
+    on = assembly(scene(ground(), SQUAT, brick("apart", (5, 5, 5), (6, 6, 6), Fidelity.FIXED)))
+    for supports, way, words in (
+        (["a"], (1.0, 0.0, 0.0), "a is not fixed"),
+        (["apart"], (1.0, 0.0, 0.0), "no joint meets"),
+        (["ground"], (0.0, 0.0, 0.0), "not all zero"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            thrust(on, supports, way)
+
+
+@pytest.mark.parametrize("degrees", [4.0, 10.0])
+def test_joints_may_shrink_until_their_edge_lies_below_the_resultant(degrees):
+    """The resultant of a block of the height h meets its foot h/2 tan β from the middle of the width b."""
+    found = geometric_safety(on_plane(TALL, degrees, 0.9))
+    share = 1.6 * np.tan(np.radians(degrees)) / 0.4
+    assert found.share == pytest.approx(share, rel=1e-3)
+    assert found.factor == pytest.approx(1.0 / share, rel=1e-3)
+
+
+def test_a_block_on_a_level_stands_on_a_point_and_one_that_falls_needs_wider_joints():
+    assert geometric_safety(on_plane(TALL, 0.0, 0.9)).factor == np.inf
+    steep = on_plane(TALL, 20.0, 0.9)
+    assert np.isnan(geometric_safety(steep).share)
+    assert geometric_safety(steep, 2.0).share == pytest.approx(4.0 * np.tan(np.radians(20.0)), rel=1e-3)
+
+
+def resultant(on):
+    force = thrust(on, ["ground"], (0.0, 0.0, -1.0)).least.force
+    return resultants(on.joints, on.contacts, force, on.strength.shear(force))
+
+
+def test_the_resultant_of_a_block_is_its_weight_at_its_place():
+    degrees = 6.0
+    on = on_plane(TALL, degrees, 0.5)
+    lean = np.radians(degrees)
+    found = resultant(on)
+    assert found.normal[0] / on.weight == pytest.approx(np.cos(lean), rel=1e-5)
+    assert found.shear[0] / on.weight == pytest.approx(np.sin(lean), rel=1e-5)
+    off = 0.8 * np.tan(lean)
+    assert found.place[0, 0] == pytest.approx(0.2 + off, abs=1e-4)
+    assert found.edge[0] == pytest.approx(2.0 * off / 0.4, rel=1e-3)
+    assert found.kern[0] == pytest.approx(6.0 * off / 0.4, rel=1e-3)
+    assert found.friction_use[0] == pytest.approx(np.tan(lean) / 0.5, rel=1e-3)
+
+
+def test_limits_of_crushing_are_levers_from_the_four_edges():
+    on = assembly(scene(ground(), brick("a", (0, 0, 0), (0.4, 0.6, 1.6))))
+    blocks = stress_blocks(on.joints, np.array([np.inf, 3e6]))
+    assert stress_blocks(on.joints, np.array([np.inf, np.inf])) is None
+    # σ times the width across: twice along each axis
+    assert sorted(blocks.limit) == pytest.approx(sorted([3e6 * 0.6] * 2 + [3e6 * 0.4] * 2))
+    for row, limit in enumerate(blocks.limit):
+        depth = 0.4 if limit > 1.5e6 else 0.6
+        assert sorted(blocks.lever[row]) == pytest.approx([0.0, 0.0, depth, depth], abs=1e-9)
+
+
+@pytest.mark.parametrize("wide", [0.2, 0.4])
+def test_a_block_that_rocks_is_an_oscillator_of_its_whole_mass(wide):
+    """λ(θ) = tan(α - θ) as the centre goes from 0 to b/2."""
+    on = assembly(scene(ground(), brick("a", (0, 0, 0), (wide, 1.0, 1.0)), friction=0.9))
+    found = kinematics(on, X, limit_load(on, X))
+    assert found.block.tolist() == [-1, 0]
+    assert found.multiplier == pytest.approx(wide, rel=EXACT)
+    assert (found.share, found.mass * 9.81, found.weight) == pytest.approx((1.0, on.weight, on.weight))
+    assert found.capacity == pytest.approx(0.5 * wide, rel=1e-4)
+    alpha, radius = np.arctan(wide), 0.5 * np.hypot(wide, 1.0)
+    turned = alpha - np.arcsin(np.sin(alpha) - found.displacement / radius)
+    assert found.multipliers == pytest.approx(np.tan(alpha - turned), abs=1e-4)
+    assert found.acceleration() == pytest.approx(wide * 9.81, rel=1e-5)
+    assert found.acceleration(1.35) == pytest.approx(wide * 9.81 / 1.35, rel=1e-5)
+
+
+def test_a_block_that_slides_has_no_end_and_two_that_slide_apart_are_two():
+    on = assembly(scene(ground(), SQUAT, brick("b", (1.5, 0, 0), (2.5, 1, 0.5)), friction=0.3))
+    found = kinematics(on, X, limit_load(on, X))
+    assert found.capacity == np.inf
+    assert found.multiplier == pytest.approx(0.3, rel=EXACT)
+
+
+def test_a_mechanism_has_its_fastest_corner_at_one():
+    on = assembly(scene(ground(), SQUAT))
+    lifted = mechanism(on, np.array([[0.0, 0.0, 4.0, 0.0, 0.0, 0.0]]))
+    assert lifted.velocity[1].tolist() == [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert lifted.speed.tolist() == [0.0, 1.0]
+    assert lifted.opening.all()
+    assert not lifted.sliding.any()
+    # a turn moves the corners by half of the width of the stone
+    size = float(on.model.surfaces.size[1])
+    both = mechanism(on, np.array([[3.0, 0.0, 0.0, 0.0, 0.0, 2.0]]))
+    assert both.velocity[1, 0] == pytest.approx(3.0 / (3.0 + size))
+    pulled = mechanism(on, np.zeros((1, 6)), np.array([[0.0, 0, -1, 0, 0, 0], np.zeros(6)]))
+    assert pulled.opening.all()
+
+
+@pytest.mark.parametrize(("turn", "cosine"), [(0.0, 1.0), (90.0, 0.0), (60.0, 0.5), (180.0, -1.0)])
+def test_the_likeness_is_the_cosine_between_both_motions_weighted_by_mass(turn, cosine):
+    on = assembly(scene(ground(), SQUAT, brick("b", (1.5, 0, 0), (2.5, 1, 1.5))))
+    velocity, falls = np.zeros((3, 6)), np.zeros((3, 3))
+    velocity[1:, 0] = 0.7
+    angle = np.radians(turn)
+    falls[1:] = 0.02 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    none = np.zeros(len(on.contacts), bool)
+    found = likeness(on, Mechanism(velocity, np.array([0.0, 1.0, 1.0]), none, none), falls)
+    assert found.cosine == pytest.approx(cosine, abs=1e-12)
+    assert (found.mechanism, found.collapse, found.common) == (1.0, 1.0, 1.0)
+    # of masses 1 and 3, the lighter alone falls: v·d is 1, of 4 times 1
+    falls[2] = 0.0
+    found = likeness(on, Mechanism(velocity, np.array([0.0, 1.0, 1.0]), none, none), falls)
+    assert found.cosine == pytest.approx(cosine * np.sqrt(0.25), abs=1e-12)
+    assert (found.mechanism, found.collapse, found.common) == (1.0, pytest.approx(0.25), pytest.approx(0.25))
+
+
+def confirmed(monkeypatch, limit, candidate, bound=np.inf, runs=12):
+    """What runs tell that hold every load up to a limit."""
+    tried = []
+
+    def trial(on, live, multiplier, *_):
+        tried.append(multiplier)
+        outcome = Outcome.EQUILIBRIUM if multiplier <= limit else Outcome.COLLAPSED
+        return ConfirmationRun(multiplier, outcome, 1, 0, np.zeros((1, 3)))
+
+    monkeypatch.setattr(confirm_module, "_trial", trial)
+    return confirm(None, None, candidate, bound, runs), tried
+
+
+@pytest.mark.parametrize("limit", [0.31, 0.48, 0.497, 0.52, 0.9, 2.0])
+def test_runs_close_in_on_the_limit_to_three_percent(monkeypatch, limit):
+    found, tried = confirmed(monkeypatch, limit, 0.5)
+    assert found.held <= limit < found.lost
+    assert found.lost <= 1.03 * found.held
+    assert tried[0] == 0.5
+    assert len(tried) <= 12
+
+
+def test_runs_go_on_beside_the_candidate_in_steps_that_double(monkeypatch):
+    up = confirmed(monkeypatch, 10.0, 0.5, runs=4)[1]
+    assert up == pytest.approx([0.5, 0.5 * 1.03, 0.5 * 1.03 * 1.06, 0.5 * 1.03 * 1.06 * 1.12])
+    down = confirmed(monkeypatch, 0.0, 0.5, runs=7)[1]
+    factors = np.array(down[1:]) / down[:-1]
+    assert factors == pytest.approx([0.97, 0.94, 0.88, 0.76, 0.52, 0.5])
+    # next to the candidate first, and half-way where that is less
+    between = confirmed(monkeypatch, 0.52, 0.5, 0.6, runs=4)[1]
+    assert between == pytest.approx([0.5, 0.515, 0.515 * 1.06, 0.5 * 0.515 * (1.0 + 1.06)])
+
+
+def test_no_run_is_made_at_a_bound_but_one_beyond_it_shows_how_stones_fall(monkeypatch):
+    found, tried = confirmed(monkeypatch, 0.5, 0.49, 0.5)
+    assert (found.held, found.lost) == (0.49, 0.5)
+    assert tried == pytest.approx([0.49, 0.515])
+    assert confirmed(monkeypatch, 9.0, 0.8, 0.5, runs=1)[1][0] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("load", "unit"), [(1.0, 2e-3), (0.99, 1e-3), (2.5, 5e-3), (0.3, 5e-4), (40.0, 5e-2), (50.0, 0.1)]
+)
+def test_loads_are_multiples_of_a_round_number_up_to_two_thousandths(load, unit):
+    assert held._unit(load) == pytest.approx(unit)
+
+
+class Stepping:
+    """Steps that hold every load below a limit; a mechanism would stop at a share of it."""
+
+    def __init__(self, limit, stops=0.97):
+        self.limit, self.stops, self.tried = limit, stops * limit, []
+
+    def __call__(self, load):
+        self.tried.append(load)
+        return held._Trial(load < self.limit, self.stops, np.zeros((0, 3)), np.zeros((1, 6)), 0.0)
+
+    def released(self, load):
+        return None
+
+
+@pytest.mark.parametrize(("limit", "most"), [(0.0077, 30), (0.333, 30), (1.0, 30), (90.0, 40)])
+def test_without_a_bound_loads_double_until_one_is_lost(monkeypatch, limit, most):
+    monkeypatch.setattr(held, "_falling", lambda on, trial: None)
+    steps = Stepping(limit)
+    found = held._without_bound(None, steps, steps(0.0))
+    assert found.held < limit <= found.lost
+    first = next(load for load in 2.0 ** np.arange(20) if load >= limit)
+    assert found.lost - found.held == pytest.approx(held._unit(first))
+    assert found.problems == len(set(steps.tried))
+    assert len(steps.tried) <= most
+
+
+def test_a_load_that_nothing_limits_is_endless():
+    steps = Stepping(np.inf)
+    found = held._without_bound(None, steps, steps(0.0))
+    assert (found.held, found.lost, found.sure) == (np.inf, np.inf, np.inf)
+    ratios = np.array(steps.tried[2:]) / steps.tried[1:-1]
+    assert ratios == pytest.approx(np.full(len(ratios), 2.0))
+
+
+def search(limit, stops):
+    steps = Stepping(limit, stops)
+    return held._Search(steps, 0.01, {0: steps(0.0)}), steps
+
+
+@pytest.mark.parametrize(("stops", "tries"), [(0.995, 3), (0.6, 12), (0.0, 18)])
+def test_a_search_goes_where_the_mechanism_would_stop(stops, tries):
+    made, steps = search(0.505, stops)
+    assert made._neighbours(0, 100, 99) == (50, 51)
+    assert len(steps.tried) <= 2 + tries
+
+
+def test_loads_below_the_limit_are_tried_ever_farther_down_to_a_hundredth():
+    made, _ = search(1.0, 1.0)
+    assert list(made._below(1000)) == [999, 998, 996, 992]
+    assert list(made._below(50)) == [49]
+    assert list(made._below(1)) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "still", "words"),
+    [
+        ([1.0, 0.5], 0, ""),
+        ([1.0, -0.1], 0, ""),
+        ([1.0, 0.0, -0.1], 0, "no load is borne any more"),
+        ([0.5], 10**6, "the stones do not follow"),
+        ([1.0] * 5, 0, "5 points"),
+    ],
+)
+def test_a_curve_ends_for_a_reason(values, still, words):
+    assert _Run._end(SimpleNamespace(), values, 5, still, lambda: False) == words
+    assert _Run._end(SimpleNamespace(), values, 5, still, lambda: True) == "stopped"
+
+
+def test_jaws_go_to_their_places_in_turn_at_one_speed():
+    path = JawPath(frozenset({"jaw"}), np.array([0.0, 1.0, 0.0]), (0.02, -0.01), 0.1)
+    assert path.until == pytest.approx(0.2 + 0.3)
+    assert [path.at(time) for time in (0.1, 0.2, 0.4, 0.5)] == pytest.approx([0.01, 0.02, 0.0, -0.01])
+    path.rise = 0.003
+    assert path.pose(0.1).displacement == pytest.approx([0.0, 0.01, 0.003])
