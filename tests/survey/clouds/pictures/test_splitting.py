@@ -2,16 +2,24 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import find_objects
 
 from survey.clouds.pictures import splitting
 from survey.clouds.pictures.bond import LIKELY
 from survey.clouds.pictures.joints import WIDTH, Strength
-from survey.clouds.pictures.splitting import Line, line_features, lines_across, propose_missing
+from survey.clouds.pictures.splitting import Line, dividing_lines, line_features, propose_missing
 
 SHAPE = (40, 90)
 ONE = np.ones(SHAPE, np.int64)
 SEEN = np.zeros(SHAPE, bool)
 SURE = (2.0 * LIKELY, 20.0, 0.0, 0.0, 0.0, 0.0)  # from a strength on, whatever the shapes
+
+
+def lines_across(regions, strength, hidden):
+    """The best lines across all regions: box of the region, axis, region, part beyond, line."""
+    for number, box in enumerate(find_objects(regions), start=1):
+        if box is not None:
+            yield from ((box, *line) for line in dividing_lines(regions, number, box, strength, hidden))
 
 
 def joints(*, upright=None, level=None):
