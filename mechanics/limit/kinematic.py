@@ -13,7 +13,7 @@ which stay what they are, the power balances
 where d_i(t) is the way of block i along the load. Of a single block, d* is the way of its centre.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,16 +84,7 @@ def kinematics(on: RigidAssembly, live: Acceleration, limit: LimitLoad) -> Kinem
         )
     moving = np.flatnonzero(block >= 0)
     weight = np.bincount(block[moving], on.model.mass[moving] * size, count)
-    centre, velocity, spin = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
-    for number in range(count):
-        members = np.flatnonzero(block == number)
-        centre[number] = on.model.mass[members] @ on.state.centre[members] / on.model.mass[members].sum()
-        first = members[np.argmax(on.model.mass[members])]
-        turning = limit.mechanism.velocity[first, 3:]
-        if 0.5 * on.model.surfaces.size[first] * np.linalg.norm(turning) > _STANDS:
-            spin[number] = turning
-        arm = centre[number] - on.state.centre[first]
-        velocity[number] = limit.mechanism.velocity[first, :3] + np.cross(spin[number], arm)
+    velocity, spin = _motions(on, limit.mechanism, [np.flatnonzero(block == k) for k in range(count)])
     along = velocity @ direction
     if not weight @ along > 0:
         raise SolverError("the mechanism does not move along the load", where=str(live))
@@ -127,6 +118,20 @@ def kinematics(on: RigidAssembly, live: Acceleration, limit: LimitLoad) -> Kinem
         multipliers=np.array([multiplier for _, multiplier in curve]),
         capacity=float(displacement[-1]) if ends else float("inf"),
     )
+
+
+def _motions(on: RigidAssembly, mechanism: Mechanism, blocks: Sequence[Ints]) -> tuple[Array, Array]:
+    """Return the velocities of the centres of blocks (k, 3), and their spins (k, 3); none of what does not turn."""
+    velocity, spin = np.zeros((len(blocks), 3)), np.zeros((len(blocks), 3))
+    for k, members in enumerate(blocks):
+        mass = on.model.mass[members]
+        centre = mass @ on.state.centre[members] / mass.sum()
+        first = members[np.argmax(mass)]
+        turning = mechanism.velocity[first, 3:]
+        if 0.5 * on.model.surfaces.size[first] * np.linalg.norm(turning) > _STANDS:
+            spin[k] = turning
+        velocity[k] = mechanism.velocity[first, :3] + np.cross(spin[k], centre - on.state.centre[first])
+    return velocity, spin
 
 
 def _end(multiplier: Callable[[float], float], fastest: float) -> tuple[float, bool]:
