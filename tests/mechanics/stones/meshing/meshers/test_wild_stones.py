@@ -149,7 +149,8 @@ import numpy as np
 from mechanics.stones.meshing.meshers.delaunay import mesh_with_delaunay
 from mechanics.stones.meshing.meshers.gmsh import mesh_with_gmsh
 from mechanics.stones.meshing.meshers.hexahedral import mesh_with_hexahedra
-from tests.mechanics.stones.meshing.wild_stones import BOX_FACES, wild_hexahedron
+from mechanics.scene.shapes import BOX_FACES
+from tests.mechanics.stones.meshing.wild_stones import wild_hexahedron
 found = {}
 for seed in map(int, sys.argv[1:]):
     corners = wild_hexahedron(np.random.default_rng(seed))
