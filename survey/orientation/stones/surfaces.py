@@ -202,13 +202,14 @@ def _cylinder(
     best = min(
         (_refined(places, covariances, axis) for axis in _starts(places)), key=lambda candidate: candidate[0]
     )
-    square, centre, axis, across, radius, normal, sigma = best
-    if not np.isfinite(square) or np.linalg.pinv(normal)[4, 4] > (_VAGUE * radius) ** 2:
+    square, centre, axis, across, radius, vague, sigma = best
+    residuals = _slopes(places, centre, axis, across)[0] - radius
+    flat = float(np.linalg.svd(places - places.mean(axis=0))[1][2])
+    if not np.isfinite(square) or vague > _VAGUE * radius or flat <= np.linalg.norm(residuals):
         raise GeometryError(
             f"the {len(points)} points do not define a cylinder: they cover too short an arc, or are plane",
             remedy="mark points farther around it, or take a plane",
         )
-    residuals = _slopes(places, centre, axis, across)[0] - radius
     redundancy = len(points) - 5
     spread = _scatter(residuals, sigma, redundancy) if scatter is None else scatter
     rms = float(np.sqrt((residuals**2).mean()))
@@ -269,10 +270,10 @@ def _slopes(points: Array, centre: Array, axis: Array, across: Array) -> tuple[A
 
 def _refined(
     points: Array, covariances: Array, axis: Array
-) -> tuple[float, Array, Array, Array, float, Array, Array]:
-    """Fit by Gauss–Newton steps; return square, centre, axis, axes across, radius, normal matrix, σ along it."""
+) -> tuple[float, Array, Array, Array, float, float, Array]:
+    """Fit by Gauss–Newton steps; return square, centre, axis, axes across, radius and its σ, σ of points along it."""
     _, centre, radius = _circle(points, axis)
-    square, normal, sigma, across = np.inf, np.eye(5), np.ones(len(points)), _frame(axis)
+    square, vague, sigma, across = np.inf, np.inf, np.ones(len(points)), _frame(axis)
     for _ in range(_MAX_ITERATIONS):
         across = _frame(axis)
         distance, rows = _slopes(points, centre, axis, across)
@@ -280,18 +281,19 @@ def _refined(
         sigma = np.sqrt(np.einsum("na,nab,nb->n", outward, covariances, outward))
         off = (distance - radius) / sigma
         rows = rows / sigma[:, None]
-        square, normal = float(off @ off), rows.T @ rows
+        square, (_, values, parts) = float(off @ off), np.linalg.svd(rows, full_matrices=False)
+        vague = float(np.linalg.norm(parts[:, 4] / np.maximum(values, np.finfo(float).tiny)))
         step = np.linalg.lstsq(rows, off, rcond=1e-10)[0]
         size = float(np.abs(step[:2]).max() + abs(step[4])) / max(radius, 1e-9) + float(
             np.abs(step[2:4]).max()
         )
         if not np.isfinite(size):
-            return np.inf, centre, axis, across, radius, normal, sigma
-        step *= min(1.0, 0.5 / size)
+            return np.inf, centre, axis, across, radius, vague, sigma
+        step *= 0.5 / max(size, 0.5)
         centre, radius = centre + step[:2] @ across, radius + float(step[4])
         axis = axis + step[2:4] @ across
         axis = axis / np.linalg.norm(axis)
         centre = centre + ((points.mean(axis=0) - centre) @ axis) * axis
         if size < 1e-12 or radius <= 0.0:
             break
-    return (square if radius > 0.0 else np.inf), centre, axis, across, radius, normal, sigma
+    return (square if radius > 0.0 else np.inf), centre, axis, across, radius, vague, sigma
