@@ -3,7 +3,7 @@
 Each reference scene runs at each profile and on a mesh that no profile has. With `--collapse` walls on a table that
 tilts, and arches that are made thinner, are held against values of limit analysis; stones are rigid, as in the
 references, or with `--elastic` deform at the meshes of the profiles. docs/accuracy.md has the tables. `--write` renews
-pipelines/tuning/measured_errors.py, from which `moma run` tells what error to expect.
+pipelines/tuning/measured_errors.json, from which `moma run` tells what error to expect.
 """
 
 import json
@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from pipelines.tuning.profiles import PROFILES, Profile
 _FINEST = replace(
     PROFILES["accurate"].rest, cells=3.0
 )  # a mesh half as fine again as that of the finest profile
-_DATA = ROOT / "pipelines/tuning/measured_errors.py"
+_DATA = ROOT / "pipelines/tuning/measured_errors.json"
 _GRAVITY, _FRICTION = 9.81, 0.65
 # of its width: a stone that has moved so far, and moves on, falls
 _FALLS = 0.02
@@ -60,7 +59,7 @@ def main() -> None:
         "--only", nargs="+", choices=names, default=names, help="scenes, or cases of collapse"
     )
     parser.add_argument("--records", type=Path, help="keep each run in this folder, and take it from there")
-    parser.add_argument("--write", action="store_true", help="renew pipelines/tuning/measured_errors.py")
+    parser.add_argument("--write", action="store_true", help="renew pipelines/tuning/measured_errors.json")
     parser.add_argument("--collapse", action="store_true", help="search loads of collapse instead")
     parser.add_argument("--elastic", action="store_true", help="let the stones of these deform, but in fast")
     options = parser.parse_args()
@@ -145,39 +144,18 @@ def _kept(name: str, scene: Scene, overlay: Overlay, records: Path | None) -> tu
 
 
 def _write(rows: Sequence[Row], loads: Mapping[str, float]) -> None:
-    """The module of the numbers, with three digits."""
-    lines = [
-        '"""Errors on the reference scenes, written by `python -m benchmarks.profiles --write`, not by hand."""',
-        "",
-        "from collections.abc import Mapping",
-        "",
-        '__all__ = ["COLLAPSE", "ERRORS"]',
-        "",
-        "ERRORS: Mapping[str, Mapping[str, tuple[float, float, float]]] = {",
-    ]
-    for profile, own in ratios(rows).items():
-        lines.append(f'    "{profile}": {{')
-        lines += [
-            f'        "{quantity}": ({", ".join(_digits(value) for value in values)}),'
-            for quantity, values in own.items()
-        ]
-        lines.append("    },")
-    lines += [
-        "}",
-        '"""By profile and quantity: the ratio of the error to its measure (pipelines.tuning.expected_errors), and',
-        'the least and the largest error of the reference scenes."""',
-        "",
-        "COLLAPSE: Mapping[str, float] = {",
-        *(f'    "{profile}": {_digits(value)},' for profile, value in loads.items()),
-        "}",
-        '"""By profile: the largest error of a load of collapse, or of a least thickness (benchmarks.profiles)."""',
-        "",
-    ]
-    _DATA.write_text("\n".join(lines), encoding="utf-8")
+    """Write the numbers, with three digits."""
+    errors = {
+        profile: {quantity: list(map(_digits, values)) for quantity, values in own.items()}
+        for profile, own in ratios(rows).items()
+    }
+    collapse = {profile: _digits(load) for profile, load in loads.items()}
+    text = json.dumps({"errors": errors, "collapse": collapse}, indent=2)
+    _DATA.write_text(f"{text}\n", encoding="utf-8")
 
 
-def _digits(value: Any) -> str:
-    return repr(float(f"{value:.3g}"))
+def _digits(value: float) -> float:
+    return float(f"{value:.3g}")
 
 
 # --- the scenes: all corners are sharp; stones stand on fixed blocks as wide as they are ---

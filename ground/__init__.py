@@ -5,6 +5,7 @@ tables   rows and columns of texts and workbooks
 kernels  compiled kernels, loaded before numba
 settings meaning, unit and bounds of a dataclass field
 toml     files of TOML, checked by settings, with the line of what is wrong
+units    units in SI, and gravity
 polygons area and centroid of a plane polygon in space
 statistics robust scale, scatter of differences, roots of falling functions
 
@@ -12,5 +13,6 @@ Public: `DatabaseError`, `ExchangeError`, `GeometryError`, `MeshError`, `Missing
 `NoDatabaseError`, `QueryError`, `SceneError`, `SolverError`, `StorageError`, `SurveyError`,
 `UnsoundSceneError`, `UsageError`, `missing_library`, `storage_error`,
 `storing` (errors); `Setting`, `declared` (settings);
-`area_and_centroid` (polygons).
+`area_and_centroid` (polygons);
+`CENTI`, `FOOT`, `GIGA`, `GRAVITY`, `INCH`, `KILO`, `LENGTHS`, `MEGA`, `MILLI`, `POUND`, `PSI`, `SURVEY_FOOT` (units).
 """

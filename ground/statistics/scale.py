@@ -20,7 +20,14 @@ CONSISTENT = 1.4826
 OUTLIER = 2.5
 """Standard deviations beyond which a value is an outlier: one normal value in eighty."""
 
-WITHIN = 0.9113
+
+def _variance_within(limit: float) -> float:
+    """Return the variance of a standard normal variable of which only values within a limit are taken."""
+    density = math.exp(-(limit**2) / 2.0) / math.sqrt(2.0 * math.pi)
+    return 1.0 - 2.0 * limit * density / math.erf(limit / math.sqrt(2.0))
+
+
+WITHIN = _variance_within(OUTLIER)
 """Variance of a standard normal variable within `OUTLIER`, over that of the whole [-]."""
 
 

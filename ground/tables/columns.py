@@ -10,11 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ground.errors import SurveyError
 from ground.tables.numbers import shown
-
-UNITS: Mapping[str, float] = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254} | {
-    "us-ft": 1200.0 / 3937.0,
-}
-"""Units of length [m]."""
+from ground.units import LENGTHS
 
 LONGEST_HEAD = 100
 """Lines before the first row of a table, at most."""
@@ -80,7 +76,7 @@ def plain(name: str) -> str:
 
 
 def length_unit(text: str, height: bool = False) -> str | None:
-    """Return the name in `UNITS` of a unit of length, however it is spelt; None if it is not known.
+    """Return the name in `LENGTHS` of a unit of length, however it is spelt; None if it is not known.
 
     Of a height, what it is counted from may follow.
 
@@ -90,7 +86,7 @@ def length_unit(text: str, height: bool = False) -> str | None:
     bare = unicodedata.normalize("NFKC", text).strip().rstrip(".").casefold()
     unit, _, zero = bare.partition(" ")
     word = _WORDS.get(bare, unit if height and plain(zero) in _ZEROS else bare)
-    return word if word in UNITS else None
+    return word if word in LENGTHS else None
 
 
 def unit_of(name: str) -> tuple[str, str | None]:
@@ -147,12 +143,12 @@ def length_scale(name: str, where: str) -> float | None:
     """
     unit = unit_of(name)[1]
     if unit is not None:
-        return UNITS[unit]
+        return LENGTHS[unit]
     if stated := re.search(r"\[\s*([^\]]+?)\s*\]", name):
         raise SurveyError(
             f"column {shown(name)} is in {shown(stated[1])}, which is not a unit of length",
             where=where,
-            remedy=f"units are {', '.join(UNITS)}",
+            remedy=f"units are {', '.join(LENGTHS)}",
         )
     return None
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ground.errors import SurveyError
 from ground.tables.columns import LONGEST_HEAD, places_of
 from ground.tables.numbers import is_number, unreadable
+from ground.tables.text_lines import LONGEST_LINE
 
 _NUMBER = re.compile(r"\s*\"?[-+]?[\d.]")
 _FORTRAN = re.compile(r"(?<=\d)[dD](?=[-+]?\d)")
-_START = 1 << 16  # bytes by which the encoding is found
 _COUNTED = 20  # rows whose first numbers count 1, 2, 3, … before it is taken for a column of point numbers
 
 
@@ -163,7 +163,7 @@ def open_numbers(path: Path, wanted: Mapping[str, Sequence[str]]) -> NumberStrea
 
 def _encoding(path: Path) -> str:
     with path.open("rb") as file:
-        start = file.read(_START)
+        start = file.read(LONGEST_LINE)
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     try:

@@ -17,7 +17,7 @@ from ground.errors import SurveyError
 from ground.tables.numbers import unreadable
 
 _BLOCK = 1 << 18  # bytes read at a time
-_LONGEST = 1 << 16  # bytes of one line: far beyond any table that people write
+LONGEST_LINE = 1 << 16  # bytes of one line: far beyond any table that people write
 _MARK = b"\xef\xbb\xbf"
 _CONTROLS = bytes(code for code in range(128) if not chr(code).isprintable() and chr(code) not in "\t\n\r")
 _SAVE_AS = "save the file as UTF-8 text"
@@ -46,7 +46,7 @@ class TextLines:
     end : number of the last line
     """
 
-    def __init__(self, path: Path, longest: int = _LONGEST) -> None:
+    def __init__(self, path: Path, longest: int = LONGEST_LINE) -> None:
         """Check the whole file, of which a line has at most so many bytes.
 
         Raises

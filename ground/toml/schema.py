@@ -1,5 +1,6 @@
 """Keys of TOML tables, and their check: unknown, missing and wrong values are reported by name and line."""
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,7 +21,7 @@ class _Required(Enum):
 REQUIRED = _Required.REQUIRED
 
 # whole numbers of TOML are unbounded; from here on they are not taken for floating-point ones
-_HUGE = 10**300
+_HUGE = int(sys.float_info.max)
 
 
 class ValueKind(Enum):

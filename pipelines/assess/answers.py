@@ -31,6 +31,7 @@ from pipelines.assess.codes.check import check_code
 from pipelines.assess.questions import LoadQuestion, Question, Thickness, ThrustQuestion
 from pipelines.assess.sensitivity import sensitivity
 from pipelines.scene.site import Site
+from survey.conventions import NEGLIGIBLE, PER_CENT, TENTH
 
 FALLS = "falls under its own weight"
 """Outcome of what does not stand at all."""
@@ -39,16 +40,16 @@ NOT_DECIDED = "not decided"
 """Outcome of what neither rests nor has fallen when its time is over."""
 
 _DROP = 0.8  # share of the peak of a capacity curve at which the way counts as ultimate [-]
-_ONE = 1.03  # limit over lowest candidate up to which they are one [-]
+_ONE = 1.0 + NEGLIGIBLE  # limit over lowest candidate up to which they are one [-]
 _SOUGHT = (
     500  # stones up to which candidates are sought: their iteration takes ten times as long as the limit [-]
 )
 _BY_RUNS = "Coulomb's friction without dilatancy, by the rule of runs: the largest load that one step from rest holds"
 _CRUSHED = "Coulomb's friction without dilatancy, candidate: stones crush, which rigid ones in runs do not"
 _UNSURE = "candidate or bound: the stones rest, but one step from rest moves them under the dead load alone"
-_ALIKE = 0.9  # cosine between mechanism and collapse from which they are one [-]
-_SAME = 0.01  # by which λ without friction across the line of sliding is lower, from which it is told [-]
-_MOVES = 0.01  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
+_ALIKE = 1.0 - TENTH  # cosine between mechanism and collapse from which they are one [-]
+_SAME = PER_CENT  # by which λ without friction across the line of sliding is lower, from which it is told [-]
+_MOVES = PER_CENT  # speed over that of the fastest stone from which a stone belongs to a mechanism [-]
 
 _FIRST = 1.0  # λ from which runs seek the limit of a load that the bound does not limit [-]
 

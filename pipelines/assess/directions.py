@@ -1,5 +1,6 @@
 """Directions in which a building is pushed: square to its façades and along them, or the weakest."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,13 +11,14 @@ from mechanics.limit.limit_load import limit_load
 from mechanics.limit.live_loads import Acceleration
 from mechanics.scene.scene import Block, Fidelity
 from pipelines.assess.questions import LoadQuestion
+from survey.conventions import ALIKE, SOME
 
-_UPRIGHT = 0.3  # vertical part of the normal of an upright face, at most [-]
+_UPRIGHT = math.sin(ALIKE)  # vertical part of the normal of an upright face, at most [-]
 _ALIKE = np.radians(5.0)  # angle within which faces belong to one façade [rad]
-_PUSH_SHARE = 0.25  # area of the upright faces that a façade has, those square to it included [-]
+_PUSH_SHARE = SOME  # area of the upright faces that a façade has, those square to it included [-]
 _AXIS_ANGLE = 0.5  # angle to an axis that is none [°]
 _COARSE, _FINE = 15, 1.0  # angles at which the weakest direction is sought, and to which [°]
-_AXES = {0.0: "x", 90.0: "y", 180.0: "-x", 270.0: "-y"}
+_AXES = {90.0 * turn: name for turn, name in enumerate(("x", "y", "-x", "-y"))}
 
 
 def push(angle: float) -> LoadQuestion:

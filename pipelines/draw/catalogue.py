@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from ground.units import CENTI, MEGA
+
 UnitOf = Callable[[float], tuple[float, str]]
 """Factor and unit by the end of a scale."""
 
@@ -47,13 +49,15 @@ def _always(factor: float, unit: str) -> UnitOf:
     return lambda _: (factor, unit)
 
 
+READABLE = 0.85  # part of a colour map on whose darkest colour edges can be seen [-]
+
 PICTURES: Mapping[str, Picture] = {
     "von_mises": Picture(
         "Von Mises stress",
         "stress",
         "Von Mises stress",
-        _always(1e-6, "MPa"),
-        ("inferno_r", 0.85),
+        _always(1.0 / MEGA, "MPa"),
+        ("inferno_r", READABLE),
         capped=True,
     ),
     "displacement": Picture("displacement", "motion", "Displacement", _length_unit),
@@ -80,7 +84,7 @@ PICTURES: Mapping[str, Picture] = {
         "error of the stress",
         "stress",
         "Estimated error of the stress",
-        _always(100.0, "%"),
+        _always(1.0 / CENTI, "%"),
         ("Purples", 1.0),
     ),
     "pressure": Picture(
@@ -88,7 +92,7 @@ PICTURES: Mapping[str, Picture] = {
         "joints",
         "Mean pressure of the joints",
         _pascals,
-        ("inferno_r", 0.85),
+        ("inferno_r", READABLE),
         capped=True,
     ),
     "resultants": Picture(

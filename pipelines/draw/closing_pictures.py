@@ -14,18 +14,19 @@ from pipelines.draw.elevations.joints import draw_joints
 from pipelines.draw.offscreen.closing import ClosingSurface
 from pipelines.draw.offscreen.parts import OBLIQUELY, fan_polygons
 from pipelines.draw.pictures import draw_apart
+from survey.conventions import ALIKE, MOST, ONE_WAY, SOME, TENTH
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 from survey.quality.facades import Facade, find_facades
 
-_FLAT = 0.2  # largest depth of a facade over its extent [-]: a deeper one is distorted by an elevation
-_LOOKING = np.cos(np.radians(25.0))  # smallest mean component of the normals across the facade [-]
-_SHARE = 0.08  # smallest share of the visible area [-]: smaller facades are not worth an elevation
+_FLAT = SOME  # largest depth of a facade over its extent [-]: a deeper one is distorted by an elevation
+_LOOKING = np.cos(ALIKE)  # smallest mean component of the normals across the facade [-]
+_SHARE = TENTH  # smallest share of the visible area [-]: smaller facades are not worth an elevation
 _MAX_ELEVATIONS = 4  # elevations of one scene
 _NOTHING = 5e-5  # smaller movements are rounding [m]
-_MAINLY = 0.6  # least share of the visible area in flat facades together [-]
-_LEVEL = 0.25  # length of the mean normal [-]: below it the stones have no common direction
-_STEEP = np.deg2rad(32.0)  # elevation of the viewer over vaults and floors [rad]
+_MAINLY = MOST  # least share of the visible area in flat facades together [-]
+_LEVEL = SOME  # length of the mean normal [-]: below it the stones have no common direction
+_STEEP = ONE_WAY  # elevation of the viewer over vaults and floors [rad]
 
 
 def draw_closing(folder: Path, shapes: ClosingShapes) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -15,15 +15,16 @@ from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.points.reading import open_points
-from survey.clouds.views.orthophoto import STEP, Picture, find_wall, paint_wall, write_picture
+from survey.clouds.views.orthophoto import DEPTH_STEP, Picture, find_wall, paint_wall, write_picture
 from survey.clouds.views.sections import Section, SectionPlane, contour, section_plane
 from survey.clouds.wall import read_wall, wall_lines
+from survey.conventions import SOME, STEP, STONE
 
 INDEX = "cloud.json"
 """Name of the file that lists all files of the folder."""
 
 _SHORTEST = 20  # pixels of a contour; shorter ones are noise
-_THINNED = 0.25  # distance of a section's line from the middles of its cells, of a cell
+_THINNED = SOME  # distance of a section's line from the middles of its cells, of a cell
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,9 @@ def draw_views(
     wall: str | None = None,
     *,
     pixel: float = 0.005,
-    slab: float = 0.5,
+    slab: float = STONE,
     sections: Sequence[str] = (),
-    thickness: float = 0.02,
+    thickness: float = STEP,
     progress: Listener = silent,
 ) -> DrawnCloud:
     """Draw a point cloud into a folder: wall.png, depth.png, their world files, wall.toml, and sections.dxf and .csv.
@@ -161,7 +162,7 @@ def _report(
         height=round(height * picture.pixel, 6),
         pixel=picture.pixel,
         coloured=picture.coloured,
-        depth_step=STEP,
+        depth_step=DEPTH_STEP,
         depth_lowest=lowest,
         sections=tuple(drawn),
         files=tuple(str(folder / name) for name in names),

@@ -1,5 +1,6 @@
 """Pictures of a loading test: the capacity curve with its band and a measured one, and the stones at its end."""
 
+import math
 from pathlib import Path
 from textwrap import wrap
 
@@ -11,11 +12,12 @@ from mechanics.dynamics.step import Step
 from mechanics.limit.loading_test import LoadingTest
 from mechanics.results.postprocess import positions
 from pipelines.draw.elevations.sheet import new_sheet
+from pipelines.draw.plots import ROW
+from survey.conventions import FEW, STEEPEST
 
-_ROW = 80  # characters in a line of a title
-_DRAWN_DISPLACEMENT = 0.08  # way of the push in the picture over the extent of the stones [-]
-_OPEN = 0.05  # opening of a joint that is marked, over the displacement of the push [-]
-_SEEN = -0.5  # component of a normal towards the viewer up to which a face is drawn [-]
+DRAWN_DISPLACEMENT = 0.08  # way of the push in the picture over the extent of the stones [-]
+_OPEN = FEW  # opening of a joint that is marked, over the displacement of the push [-]
+_SEEN = -math.cos(STEEPEST)  # component of a normal towards the viewer up to which a face is drawn [-]
 
 
 def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, measured: Array | None) -> None:
@@ -40,7 +42,7 @@ def draw_curve(path: Path, title: str, test: LoadingTest, band: Array | None, me
     axes.axhline(0.0, color="black", lw=0.5)
     axes.set_xlabel("displacement of the push [mm]")
     axes.set_ylabel("force [kN]")
-    axes.set_title("\n".join(wrap(title, _ROW)), fontsize=10, parse_math=False)
+    axes.set_title("\n".join(wrap(title, ROW)), fontsize=10, parse_math=False)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="best")
     figure.savefig(path)
@@ -56,7 +58,7 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     extent = float((high - low).max())
     # by the way of the push: a stone that has fallen out would leave none for the others
     displacement = abs(float(test.displacement[np.abs(test.force).argmax() if step is test.peak else -1]))
-    factor = _DRAWN_DISPLACEMENT * extent / max(displacement, 1e-9)
+    factor = DRAWN_DISPLACEMENT * extent / max(displacement, 1e-9)
 
     def drawn(start: Array, end: Array) -> Array:
         """Project places (n, 3) at the end of the step, their displacements exaggerated."""
@@ -80,13 +82,13 @@ def draw_pushed(path: Path, title: str, test: LoadingTest, step: Step) -> None:
     kept = ~model.fixed[contacts.bodies[wide]]
     ends = (material_points(contacts, state)[wide][kept] for state in (test.settled, step.after))
     axes.plot(*drawn(*ends).T, ".", color="#c0392b", markersize=3)
-    margin = 2 * _DRAWN_DISPLACEMENT * extent
+    margin = 2 * DRAWN_DISPLACEMENT * extent
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_title(
-        "\n".join([*wrap(title, _ROW), f"displacements × {factor:.3g}; red: joints that are open"]),
+        "\n".join([*wrap(title, ROW), f"displacements × {factor:.3g}; red: joints that are open"]),
         fontsize=9,
         parse_math=False,
     )

@@ -11,12 +11,11 @@ from mechanics.limit.assembly import RigidAssembly
 from mechanics.limit.joints import Resultants
 from mechanics.limit.limit_load import Mechanism
 from mechanics.scene.scene import Block
+from pipelines.draw.loading import DRAWN_DISPLACEMENT
 from pipelines.draw.offscreen.mechanism import MechanismSurface
 from pipelines.draw.pictures import draw_apart
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
-
-_DRAWN_DISPLACEMENT = 0.06  # of the fastest corner over the extent of the scene [-]
 
 
 def draw_mechanisms(
@@ -41,7 +40,7 @@ def draw_mechanisms(
     """
     corners = np.concatenate([block.vertices for block in blocks])
     owner = np.repeat(np.arange(len(blocks)), [len(block.vertices) for block in blocks])
-    way = _DRAWN_DISPLACEMENT * float(np.ptp(corners, axis=0).max())
+    way = DRAWN_DISPLACEMENT * float(np.ptp(corners, axis=0).max())
     moved, places, forces, kerns = [], [], [], []
     pictures: list[dict[str, Any]] = []
     arm = corners - on.state.centre[owner]

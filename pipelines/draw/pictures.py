@@ -25,12 +25,13 @@ from pipelines.draw.offscreen.jobs import save_job
 from pipelines.draw.offscreen.surfaces import FIELDS, stone_fields, support_motion, wall_surface
 from pipelines.results.peaks import peak_records
 from pipelines.results.summary import length_tolerance
+from survey.conventions import FEW
 
 OF_RESULTS = "pipelines.draw.offscreen.result"
 """Module that draws the pictures of a result."""
 
 
-_PASSED = 1.05  # peak over the value at the end, from which a picture of the end states it [-]
+_PASSED = 1.0 + FEW  # peak over the value at the end, from which a picture of the end states it [-]
 _WINDOWS = (
     "vtkEGLRenderWindow",
     None,

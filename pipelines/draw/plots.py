@@ -14,7 +14,7 @@ from pipelines.draw.elevations.sheet import new_sheet
 if TYPE_CHECKING:
     from mechanics.limit.pushover import Pushover
 
-_ROW = 80  # characters in a line of a title
+ROW = 80  # characters in a line of a title
 _CURVES = (
     ("speed", "speed [m/s]", "#8a3b12"),
     ("balance", "unbalanced force / weight", "#1f5f8b"),
@@ -56,7 +56,7 @@ def draw_capacity(path: Path, title: str, curve: "Pushover", bound: float) -> No
     axes.set_ylim(0.0, 1.2 * bound)
     axes.set_xlabel(f"way of {curve.control} along the load [mm]")
     axes.set_ylabel("λ [-]")
-    wrapped = "\n".join(part for line in title.splitlines() for part in wrap(line, _ROW))
+    wrapped = "\n".join(part for line in title.splitlines() for part in wrap(line, ROW))
     axes.set_title(wrapped, fontsize=10, parse_math=False)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="upper right")

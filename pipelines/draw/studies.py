@@ -8,9 +8,9 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import new_sheet
+from survey.conventions import LARGEST
 
 _BLUE, _RED, _GREY = "#1f5f8b", "#8a3b12", "#b0b0b0"
-_MAX_BARS = 15  # bars of a tornado
 
 
 def draw_samples(path: Path, name: str, values: Array, level: float | None) -> None:
@@ -69,7 +69,7 @@ def draw_fragility(path: Path, name: str, rows: Sequence[Mapping[str, Any]], sma
 
 def draw_tornado(path: Path, shares: Mapping[str, float]) -> None:
     """Draw shares of the variance as bars, the largest first."""
-    rows = sorted(shares.items(), key=lambda row: -row[1])[:_MAX_BARS]
+    rows = sorted(shares.items(), key=lambda row: -row[1])[:LARGEST]
     figure = new_sheet((7.0, 0.8 + 0.3 * len(rows)))
     axes = figure.subplots()
     axes.barh([name for name, _ in rows], [100.0 * share for _, share in rows], color=_BLUE)

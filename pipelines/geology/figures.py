@@ -12,6 +12,7 @@ from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.trishear import Trishear
 from pipelines.draw.elevations.sheet import new_sheet
 from pipelines.geology.observe import WHOLE, Fields
+from survey.conventions import PER_CENT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,7 @@ _LAYERS = (
 _CELL = "#1f3fbf"  # colour of the disks of a cell among the layers
 _ARROWS = 600  # of velocities, at most
 _STRONGEST = 3.0  # width of a line of the strongest force [point]
-_SHARE = 0.99  # of the values that the scale of shear covers [-]
+_SHARE = 1.0 - PER_CENT  # of the values that the scale of shear covers [-]
 
 
 def draw_instant(

@@ -11,7 +11,7 @@ from mechanics.arrays import Array, Ints
 from mechanics.planar.measures.cells import Cell, members
 from pipelines.geology.observe import CELL_COLUMNS, Fields
 from pipelines.geology.sample import PreparedSample
-from pipelines.results.vtu import LINE, POLYGON, VERTEX, UnstructuredGrid, cells_of, write_pvd, write_vtu
+from pipelines.results.vtu import CellType, UnstructuredGrid, cells_of, write_pvd, write_vtu
 
 _UNITS = units_of("disks", "cell of disks")
 
@@ -72,7 +72,7 @@ def _disks(fields: Fields, sample: PreparedSample, followed: Mapping[str, Ints])
         "volume": fields.volume,
         "shear": fields.shear,
     }
-    cells = cells_of(VERTEX, np.arange(count)[:, None].tolist())
+    cells = cells_of(CellType.VERTEX, np.arange(count)[:, None].tolist())
     return UnstructuredGrid(_space(fields.position[:count, :2]), cells, data, {}, _UNITS)
 
 
@@ -85,7 +85,7 @@ def _contacts(fields: Fields) -> UnstructuredGrid:
         "force_tangential": fields.force_tangential,
         "gap": fields.gap,
     }
-    lines = cells_of(LINE, np.arange(2 * count).reshape(-1, 2).tolist())
+    lines = cells_of(CellType.LINE, np.arange(2 * count).reshape(-1, 2).tolist())
     ends = {name: np.repeat(values, 2, axis=0) for name, values in data.items()}
     return UnstructuredGrid(
         _space(fields.branches.reshape(-1, 2)), lines, ends, {"bodies": fields.bodies}, _UNITS
@@ -109,4 +109,4 @@ def _cells(
         first = sum(map(len, points))
         corners.append(list(range(first, first + len(hull))))
         points.append(hull)
-    return UnstructuredGrid(_space(np.vstack(points)), cells_of(POLYGON, corners), {}, data, _UNITS)
+    return UnstructuredGrid(_space(np.vstack(points)), cells_of(CellType.POLYGON, corners), {}, data, _UNITS)

@@ -27,11 +27,12 @@ from pipelines.results.folder import RUN_INDEX, source_of
 from pipelines.results.summary import as_json
 from pipelines.run.record import versions
 from pipelines.run.unfinished import UnfinishedRun
+from survey.conventions import PER_CENT, PER_MILLE
 
-_MOST_OVERLAP = 0.01  # over the smallest radius, beyond which a run says so first [-]
+_MOST_OVERLAP = PER_CENT  # over the smallest radius, beyond which a run says so first [-]
 _FABRIC = ("anisotropy", "fabric_direction", "coordination", "porosity")  # columns of a cell
 _EXPERIMENT = "experiment.csv"  # rows of what the experiment observes
-_OVERLAP_ROUNDING = 1e-3  # of an overlap that is just as large as allowed [-]
+_OVERLAP_ROUNDING = PER_MILLE  # of an overlap that is just as large as allowed [-]
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,9 @@ from pipelines.results.folder import UNFINISHED, check_replaceable
 from pipelines.run.planar import run_planar
 from pipelines.run.record import error_measures, store_record, versions
 from pipelines.run.unfinished import UnfinishedRun
+from survey.conventions import TENTH
 
-_ON_THE_FLOOR = 0.1  # gap over the smallest radius below which a disk stands on the floor [-]
+_ON_THE_FLOOR = TENTH  # gap over the smallest radius below which a disk stands on the floor [-]
 _START = 2000  # iterations of ADMM, at most, that find the forces of the sample at rest
 _SAMPLES = ".samples"  # folder of prepared samples, beside that of the results
 

@@ -12,9 +12,9 @@ from mechanics.arrays import Array, Ints
 from mechanics.dynamics.progress import Listener, silent
 from mechanics.planar.deposit import Deposit, deposit
 from pipelines.geology.file import GeologyScene
+from pipelines.scene.fingerprint import DIGITS
 
 _VERSION = 4  # of the preparation: a change of its outcome raises it
-_DIGITS = 16  # of the digest that names a sample
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def prepare(scene: GeologyScene, cache: Path, progress: Listener = silent) -> Pr
         "gravity": scene.time.gravity,
         "profile": hashlib.sha256(np.append(x, experiment.top(x)).tobytes()).hexdigest(),
     }
-    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:_DIGITS]
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:DIGITS]
     path = cache / f"{digest}.npz"
     stored = _stored(path)
     if stored is None:

@@ -5,6 +5,10 @@ from typing import Annotated
 
 from ground.errors import SceneError
 from ground.settings import Setting
+from ground.units import GRAVITY
+
+FRICTION = 0.4
+"""Usual friction between disks [-]."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class SampleSettings:
         Setting(
             "Friction while disks are deposited; less makes the sample denser.", "-", at_least=0, at_most=10
         ),
-    ] = 0.4
+    ] = FRICTION
     seed: Annotated[int, Setting("Of sizes and places; another seed is another sample.", at_least=0)] = 1
     layers: Annotated[
         int, Setting("Marker layers of pictures and measures, of equal heights.", at_least=1, at_most=50)
@@ -61,7 +65,7 @@ class SampleSettings:
 class DiskContact:
     """`[contact]`: the laws of the contacts."""
 
-    friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=10)] = 0.4
+    friction: Annotated[float, Setting("Between disks.", "-", at_least=0, at_most=10)] = FRICTION
     wall_friction: Annotated[
         float | None,
         Setting("Between disks and walls; without it, that between disks.", "-", at_least=0, at_most=10),
@@ -102,7 +106,7 @@ class Stepping:
     step: Annotated[float, Setting("Time step h.", "s", above=0)]
     steps: Annotated[int, Setting("Number of steps.", at_least=1)]
     theta: Annotated[float, Setting("Integration parameter θ.", "-", at_least=0.5, at_most=1)] = 1.0
-    gravity: Annotated[float, Setting("Downwards; the sample settles under it.", "m/s²", above=0)] = 9.81
+    gravity: Annotated[float, Setting("Downwards; the sample settles under it.", "m/s²", above=0)] = GRAVITY
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from pipelines.ingest.reading_options import Source
 from survey.clouds.outlines.outline import field_map
 from survey.clouds.settings import CloudOptions, MaskOptions
 from survey.clouds.wall import read_wall
+from survey.conventions import FARTHEST, THINNEST
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import open_survey
 from survey.records.review import Doubtful
@@ -20,8 +21,7 @@ from survey.records.survey import Reject, SurveyStream
 
 _MARK = b"outlines rejected by moma"
 _SIZE = re.compile(r"(\d+(?:[.,]\d+)?)\s*[x×]\s*(\d+(?:[.,]\d+)?)")
-_LARGEST = 1000.0  # size of a wall [m]
-_SIGMAS = (1e-5, 0.2)  # bounds of the standard deviation of a drawn corner [m]
+_SIGMAS = (THINNEST, 0.2)  # bounds of the standard deviation of a drawn corner [m]
 
 
 def open_source(
@@ -222,7 +222,7 @@ def size_of(text: str) -> tuple[float, float]:
     match = _SIZE.fullmatch(text.strip().lower().removesuffix("m").strip())
     if match is not None:
         width, height = (float(group.replace(",", ".")) for group in match.groups())
-        if 0.0 < width < _LARGEST and 0.0 < height < _LARGEST:
+        if 0.0 < width < FARTHEST and 0.0 < height < FARTHEST:
             return width, height
     remedy = "give width and height of the picture or wall in metres, e.g. 1.0x1.2"
     raise UsageError(f"is {text!r}", where="--size", remedy=remedy)

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ground.errors import UsageError
-from ground.tables.columns import UNITS, length_unit
+from ground.tables.columns import length_unit
+from ground.units import LENGTHS
 from survey.formats.native.reader import with_header
 from survey.formats.options import ReadingOptions
 from survey.formats.reading import ENDINGS, format_of, solid_files
@@ -136,7 +137,7 @@ def reading_options(
     codes : template of the codes of a point list
     kind : of stones without one
     sigma : of a coordinate, where the file has none; it takes precedence over the header file [m]
-    unit : one of `UNITS`, in which coordinates are given
+    unit : one of `LENGTHS`, in which coordinates are given
     columns : names of columns of a table by what they are, e.g. ``block=Stein,x=Rechts``
     sheet : of a workbook
     kinds : abbreviations of kinds, e.g. ``SPR=springer``, or a file with them
@@ -164,9 +165,9 @@ def reading_options(
         options = replace(options, sigma=sigma)
     if unit is not None:
         if (unit_name := length_unit(unit)) is None:
-            what, remedy = f"unknown unit {unit!r}", f"units: {', '.join(UNITS)}"
+            what, remedy = f"unknown unit {unit!r}", f"units: {', '.join(LENGTHS)}"
             raise UsageError(what, where="--unit", remedy=remedy)
-        options = replace(options, unit=UNITS[unit_name])
+        options = replace(options, unit=LENGTHS[unit_name])
     return options
 
 

@@ -13,7 +13,7 @@ from pipelines.ingest.records import frame_record
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.geometry.convexity import is_convex
-from survey.quality.plausible import LENGTH, doubt_of, lies_on_its_side, question_of_unit
+from survey.records.plausible import LENGTH, doubt_of, lies_on_its_side, question_of_unit
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 from survey.records.survey import Reject

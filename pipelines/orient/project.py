@@ -12,6 +12,7 @@ from ground.settings import Setting
 from ground.toml.keys import Numbers, Texts, Vector, keys_of, read_table
 from ground.toml.lines import key_lines, parse_toml, read_text
 from ground.toml.schema import Key, TomlDocument, ValueKind, check_table, nearest, tables_of
+from survey.conventions import PER_CENT
 from survey.orientation.formats.colmap import read_colmap
 from survey.orientation.formats.control import read_control, with_control
 from survey.orientation.formats.dbat import read_dbat
@@ -286,7 +287,7 @@ def exported_control(network: Network, fixed: bool) -> Network:
 
 
 _ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
-_ASPECT = 0.01  # difference of width over height between a camera and its picture, relative
+_ASPECT = PER_CENT  # difference of width over height between a camera and its picture, relative
 
 
 def _pictures(document: TomlDocument, folder: Path, network: Network) -> dict[str, Path]:

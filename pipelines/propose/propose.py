@@ -18,6 +18,7 @@ from ground.errors import UsageError
 from mechanics.arrays import Array
 from pipelines.ingest.records import stone_record, surveyed_block
 from pipelines.ingest.relate import relate
+from survey.conventions import FARTHEST, PER_MILLE
 from survey.extrusion.imported_solids import block_of_solid
 from survey.faces.faces import Provenance
 from survey.geometry.solids import Solid, volume_of
@@ -30,8 +31,9 @@ from survey.unseen.core.settings import InfillSettings
 from survey.unseen.missing.propose import propose_missing
 from survey.unseen.missing.settings import MissingSettings
 
-_MAX_DISTANCE = 1000.0  # distance of the viewpoint in front of the wall [m], large enough to see it squarely
-_PROPOSAL_DIFFERENCE = 1e-3  # largest difference of equal proposals, in position [m] and relative volume [-]
+_PROPOSAL_DIFFERENCE = (
+    PER_MILLE  # largest difference of equal proposals, in position [m] and relative volume [-]
+)
 
 _SIZE = ("code", "kind", "course", "zone", "length", "height", "depth")
 # kinds that are no stones, and those of vaults, which stand in no facing; their subkinds, too
@@ -252,7 +254,7 @@ def core_record(proposal: InfillProposal) -> StoneRecord:
     """Make the record of a part of the core: kind infill, its face being the side towards the first facing."""
     solid = proposal.solid
     record = SolidRecord(proposal.code, "infill", proposal.course, solid.vertices, solid.faces)
-    viewpoint = solid.vertices.mean(axis=0) + _MAX_DISTANCE * proposal.normal
+    viewpoint = solid.vertices.mean(axis=0) + FARTHEST * proposal.normal
     block = block_of_solid(record, viewpoint, "the proposal")
     face = replace(block.face, provenance=Provenance("hypothesis", proposal.evidence))
     depth = replace(block.depth, source=f"hypothesis: {proposal.evidence}")

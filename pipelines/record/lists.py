@@ -18,6 +18,7 @@ from pipelines.record.attachments import Attachment
 from pipelines.record.attribute_lists import AttributeList, read_attribute_list, record_attribute_list
 from pipelines.record.relation_lists import RelationList, read_relation_list, record_relation_list
 from pipelines.record.term_lists import TermList, read_term_list, record_term_list
+from survey.conventions import LISTED
 
 LISTS = (
     *(".csv", ".tsv", ".txt", ".xlsx", ".xls", ".xlsb", ".ods"),
@@ -25,8 +26,6 @@ LISTS = (
     *ENDINGS,
 )
 """Endings of files that are not TOML."""
-
-_SHOWN = 12  # names in a note
 
 
 @dataclass(frozen=True)
@@ -145,8 +144,8 @@ def _notes(content: RelationList | AttributeList, tables: dict[str, RowCounts]) 
     """Yield what was left out, and what is new and may be misspelt."""
     if isinstance(content, AttributeList):
         if content.left_out:
-            rest = ", …" if len(content.left_out) > _SHOWN else ""
-            yield f"columns that are not recorded: {', '.join(content.left_out[:_SHOWN])}{rest}"
+            rest = ", …" if len(content.left_out) > LISTED else ""
+            yield f"columns that are not recorded: {', '.join(content.left_out[:LISTED])}{rest}"
         for what in ("phase", "material"):
             if count := tables.get(f"new {what}", NOTHING).new:
                 yield f"{count} names of the column {what} were not declared before; see: moma query, moma show"

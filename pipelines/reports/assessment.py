@@ -17,14 +17,14 @@ from pipelines.reports.html import (
 )
 from pipelines.reports.page.model import Model
 from pipelines.results.wall_axes import WallAxes, axes_of
+from survey.conventions import LISTED, TENTH
 
 _CAPTIONS = {
     "mechanism": "As the stones begin to move, exaggerated.",
     "pushover": "What the stones bear as one of them is led to collapse.",
     "forces": "Resultants of the joints at the limit: blue within the kern, red outside.",
 }
-_MAX_STONES = 12  # stones of a mechanism that are named
-_SHARE = 0.1  # change of friction and depth by which the sensitivity of a limit is told [-]
+_SHARE = TENTH  # change of friction and depth by which the sensitivity of a limit is told [-]
 
 
 def write_assessment(path: Path, summary: Mapping[str, Any], model: Model | None = None) -> None:
@@ -189,8 +189,8 @@ def _check(check: Mapping[str, Any]) -> dict[str, str]:
 def _mechanism(stones: Sequence[Mapping[str, Any]]) -> str:
     if not stones:
         return "Nothing moves."
-    named = ", ".join(stone["code"] for stone in stones[:_MAX_STONES])
-    more = f" and {len(stones) - _MAX_STONES} more" if len(stones) > _MAX_STONES else ""
+    named = ", ".join(stone["code"] for stone in stones[:LISTED])
+    more = f" and {len(stones) - LISTED} more" if len(stones) > LISTED else ""
     return f"Moves, the fastest first: {named}{more}."
 
 

@@ -24,6 +24,7 @@ T = TypeVar("T")
 Picture = dict[str, str]
 """Caption and base64 content of a PNG."""
 
+MAX_ROWS = 300  # rows of a table; the result as JSON has them all
 _LONGEST = 32  # characters of a number with its precision and unit; a longer cell is a sentence
 
 

@@ -5,9 +5,10 @@ from typing import Any
 
 from archmodel.quantities import quantities_of
 from pipelines.reports.html import Table, in_words, table_of
+from survey.conventions import FEW, PER_MILLE
 
-_PASSED = 1.05  # peak over the value at the end, from which the end says too little [-]
-_NO_FORCE = 1e-3  # of the weight [-]: a smaller reaction is not worth a line
+PASSED = 1.0 + FEW  # peak over the value at the end, from which the end says too little [-]
+_NO_FORCE = PER_MILLE  # of the weight [-]: a smaller reaction is not worth a line
 
 
 def passed_peaks(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -16,7 +17,7 @@ def passed_peaks(summary: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return {
         name: one
         for name, one in known.items()
-        if one["value"] > _PASSED * max(one["end"], 0.0) and one["value"] > _least(one, summary, least)
+        if one["value"] > PASSED * max(one["end"], 0.0) and one["value"] > _least(one, summary, least)
     }
 
 

@@ -6,9 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.draw.photographs import draw_network, draw_photo_residuals
-from pipelines.reports.html import picture, table_of, write_page
-
-_MAX_ROWS = 200  # rows of a table; orientation.json has them all
+from pipelines.reports.html import MAX_ROWS, picture, table_of, write_page
 
 Row = tuple[str, ...]
 
@@ -73,10 +71,10 @@ def photographs_section(
         "pictures": [picture(folder / name, caption) for name, caption in pictures.items()],
         "adjustment": _adjustment(values),
         "cameras": [_camera(camera) for camera in values["cameras"]],
-        "photos": table_of("photographs", values["photos"], _photo, _MAX_ROWS),
-        "control": table_of("control of photographs", values["control"], _control, _MAX_ROWS),
-        "suspected": table_of("suspected marks", suspected, partial(_mark, marks), _MAX_ROWS),
-        "correlations": table_of("correlations", values["correlations"], _correlation, _MAX_ROWS),
+        "photos": table_of("photographs", values["photos"], _photo, MAX_ROWS),
+        "control": table_of("control of photographs", values["control"], _control, MAX_ROWS),
+        "suspected": table_of("suspected marks", suspected, partial(_mark, marks), MAX_ROWS),
+        "correlations": table_of("correlations", values["correlations"], _correlation, MAX_ROWS),
     }
 
 

@@ -30,6 +30,7 @@ from pipelines.reports.html import (
 )
 from pipelines.reports.page.model import Model
 from pipelines.reports.peaks import peak_table
+from survey.conventions import LARGEST, SAME
 
 _OUTCOMES = {
     "equilibrium": "It stands as surveyed: every stone is at rest, in balance.",
@@ -80,8 +81,7 @@ _STAGES = (
 )
 
 _WALL = {"along": "to the right along the wall", "outwards": "outwards", "up": "upwards"}
-_MOST = 10  # stones and joints of a table
-_SEEN = 1e-6  # over the width of a joint: a smaller movement is rounding
+_SEEN = SAME  # over the width of a joint: a smaller movement is rounding
 
 
 @dataclass(frozen=True)
@@ -337,7 +337,7 @@ def _worst(stones: Sequence[StoneResult], value: Callable[[StoneResult], float |
     """Return the stones with the largest values, of those that have one."""
     known = [(found, stone) for stone in stones if (found := value(stone)) is not None]
     known.sort(key=lambda pair: pair[0], reverse=True)
-    return [stone for _, stone in known[:_MOST]]
+    return [stone for _, stone in known[:LARGEST]]
 
 
 def _joints(result: Result, summary: Mapping[str, Any]) -> list[_Section]:
@@ -365,7 +365,7 @@ def _structures(summary: Mapping[str, Any]) -> list[_Section]:
         of_kind.sort(key=lambda structure: -structure.get(shown[0], -np.inf))
         rows = [
             (structure["code"], *(_value(structure.get(name), quantities[name], summary) for name in shown))
-            for structure in of_kind[:_MOST]
+            for structure in of_kind[:LARGEST]
         ]
         words = kind.replace("_", " ")
         head = (_capital(words), *(quantities[name].heading for name in shown))
@@ -380,7 +380,7 @@ def _value(value: float | None, quantity: Quantity, summary: Mapping[str, Any]) 
 def _joint_table(result: Result, order: Array, least: float) -> Table:
     """Describe the joints with the largest finite values of `order`; movements below `least` [m] as such."""
     joints, codes = result.joints, [body.code for body in result.bodies]
-    largest = [k for k in np.argsort(-order, kind="stable")[:_MOST].tolist() if np.isfinite(order[k])]
+    largest = [k for k in np.argsort(-order, kind="stable")[:LARGEST].tolist() if np.isfinite(order[k])]
     return table_of(
         "joint",
         largest,

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.reports.html import percent, picture, table_of, write_page
+from survey.conventions import LARGEST
 
 _CAPTIONS = {
     "histogram": "Samples of the quantity, and the share of them that is below each value.",
@@ -13,7 +14,6 @@ _CAPTIONS = {
     "tornado": "Share of the variance by what the stones have in common, and by the scatter of each.",
     "elevation": "Variance that the best measurement of each stone would take away.",
 }
-_MAX_ACTIONS = 20  # actions that the page shows
 
 
 def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str]) -> None:
@@ -43,7 +43,7 @@ def write_study(path: Path, summary: Mapping[str, Any], pictures: Sequence[str])
             "actions",
             summary["actions"],
             lambda action: {"text": action["text"], "share": percent(action["share"])},
-            _MAX_ACTIONS,
+            LARGEST,
         ),
         certain=summary["certain"],
         figures=[picture(path.parent / name, _CAPTIONS[Path(name).stem]) for name in pictures],

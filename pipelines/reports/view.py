@@ -19,16 +19,16 @@ from archmodel.tables.entries import Entry
 from archmodel.tables.surveys import Survey
 from ground.errors import UsageError
 from mechanics.arrays import Array
-from pipelines.reports.html import Table, page_text, table_of
+from pipelines.reports.html import MAX_ROWS, Table, page_text, table_of
 from pipelines.reports.page.elevation import elevation
 from pipelines.reports.page.inline import again, packed_models
 from pipelines.reports.page.known import known_stones
 from pipelines.reports.page.model import Model
 from pipelines.reports.page.scenes import with_known
 from pipelines.reports.page.surfaces import stones_of
+from survey.conventions import SOME
 
-_FACING = 0.2  # length of the mean normal from which stones have one direction [-]
-_MOST = 500  # rows of the table of stones
+_FACING = SOME  # length of the mean normal from which stones have one direction [-]
 _TABLE = ("code", "kind", "course", "zone", "phase", "depth", "depth_origin", "rms")
 
 
@@ -113,7 +113,7 @@ def view_page(
         kinds=table_of("row", sorted(counts.items()), lambda kind: {"kind": kind[0], "stones": str(kind[1])}),
         stones=Table(
             tuple(name.replace("_", " ").capitalize() for name in _TABLE),
-            [tuple(_cell(row[name]) for name in _TABLE) for row in rows[:_MOST]],
+            [tuple(_cell(row[name]) for name in _TABLE) for row in rows[:MAX_ROWS]],
             len(rows),
         ),
     )

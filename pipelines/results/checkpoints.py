@@ -35,6 +35,7 @@ from mechanics.results.result import Frame, Largest
 from mechanics.results.stages import StageResult
 from mechanics.scene.laws.law import Terms
 from mechanics.scene.state import State
+from pipelines.results.vtkhdf import ROOM
 
 _RECORDS = {
     record.__name__: record
@@ -57,7 +58,6 @@ _RECORDS = {
 _HEAD = 512  # bytes that HDF5 leaves to its users; the least that it allows
 _VALUES = "values"
 _GENERATIONS = 2  # checkpoints that are kept
-_BLOCK = 1 << 20  # bytes by which a file grows in memory
 
 
 class DamagedError(Exception):
@@ -191,7 +191,7 @@ def _image(values: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
 
     encoded = np.frombuffer(json.dumps(values, ensure_ascii=False).encode(), dtype=np.uint8)
     with h5py.File(
-        "image", "w", driver="core", backing_store=False, block_size=_BLOCK, userblock_size=_HEAD
+        "image", "w", driver="core", backing_store=False, block_size=ROOM, userblock_size=_HEAD
     ) as file:
         file[_VALUES] = encoded
         for name, array in arrays.items():

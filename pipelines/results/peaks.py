@@ -10,9 +10,10 @@ from mechanics.arrays import Array, Bools
 from mechanics.dynamics.outcome import Outcome
 from mechanics.results.result import Largest, Peaks, Result
 from mechanics.scene.scene import Fidelity
+from survey.conventions import MOST, PER_MILLE
 
-_LIFTED = 1e-3  # opening over the width of a stone, an angle [rad], from which it rocks: a hundredth of a slender one's
-_CLOSED = 0.5  # part of its largest opening that a joint has in the end, below which it has closed again [-]
+_LIFTED = PER_MILLE  # opening over the width of a stone, an angle [rad], from which it rocks
+_CLOSED = MOST  # part of its largest opening that a joint has in the end, below which it has closed again [-]
 _CHAOTIC = (
     "relative_displacement",
     "opening",

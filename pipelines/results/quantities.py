@@ -16,6 +16,7 @@ from mechanics.arrays import Array
 from mechanics.results.result import BodyResult, Result
 from mechanics.scene.scene import Fidelity
 from pipelines.results.stone_values import stress_statistics
+from survey.conventions import SAME
 
 QUANTITIES: Mapping[str, str] = {
     "outcome": "1 if the scene ends otherwise, else 0",
@@ -38,7 +39,7 @@ QUANTITIES: Mapping[str, str] = {
 """Quantities and their meanings. The last five have a true value of zero: they are errors themselves."""
 
 _OWN_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
-_NO_MOVEMENT = 1e-6  # of the size of a stone [-]; overlaps of rigid stones at rest are smaller
+_NO_MOVEMENT = SAME  # of the size of a stone [-]; overlaps of rigid stones at rest are smaller
 
 
 @dataclass(frozen=True)

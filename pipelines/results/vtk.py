@@ -15,10 +15,8 @@ from mechanics.scene.scene import Block, Fidelity
 from mechanics.stones.elasticity.tensors import principal, von_mises
 from pipelines.results.vtu import (
     CELL_TYPES,
-    POLYGON,
-    POLYHEDRON,
-    VERTEX,
     Cells,
+    CellType,
     UnstructuredGrid,
     cells_of,
     write_pvd,
@@ -73,7 +71,7 @@ def body_cells(result: Result) -> Cells:
             connectivity.append(offset + np.unique([node for face in body.faces for node in face]))
             stream = np.fromiter(_stream(body, offset), dtype=np.int64)
             sizes.append(np.array([len(connectivity[-1])]))
-            types.append(np.array([POLYHEDRON]))
+            types.append(np.array([CellType.POLYHEDRON]))
             streams.append(stream)
             end += len(stream)
             ends.append(np.array([end]))
@@ -172,7 +170,7 @@ def contact_grid(contacts: ContactResult) -> UnstructuredGrid:
     count = len(contacts.gap)
     return UnstructuredGrid(
         points=contacts.point,
-        cells=cells_of(VERTEX, [[index] for index in range(count)]),
+        cells=cells_of(CellType.VERTEX, [[index] for index in range(count)]),
         point_data={
             **{name: getattr(contacts, name) for name in CONTACT_ARRAYS},
             "status": status_numbers(contacts),
@@ -211,7 +209,9 @@ def joint_grid(joints: JointResult) -> UnstructuredGrid:
             values[name] = getattr(joints, name)
     return UnstructuredGrid(
         points=np.concatenate([*polygons, np.zeros((0, 3))]),
-        cells=cells_of(POLYGON, [range(end - size, end) for size, end in zip(sizes, ends, strict=True)]),
+        cells=cells_of(
+            CellType.POLYGON, [range(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+        ),
         point_data={},
         cell_data=values,
         units=UNITS,

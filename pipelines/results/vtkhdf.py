@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from mechanics.results.result import BodyResult, Frame
 from mechanics.scene.scene import Block
 from pipelines.results.vtk import CONTACT_ARRAYS, FIDELITIES, point_fields, status_numbers
-from pipelines.results.vtu import CELL_TYPES, POLYGON, VERTEX
+from pipelines.results.vtu import CELL_TYPES, CellType
 
 RESULTS = "results.vtkhdf"
 """Name of the file."""
@@ -33,8 +33,8 @@ _ROOT = "VTKHDF"
 _VERSION = (2, 1)
 _CHUNK = 1 << 12  # bytes that an array of a growing file takes at least, at a time
 _STEPS_CHUNK = 128  # frames of which a growing file stores the offsets at a time
-_ROOM = 1 << 20  # bytes of a file beside its frames, at most
-_SHARE = 0.04  # most of the time that a growing file may take; it waits where frames come faster [-]
+ROOM = 1 << 20  # bytes of a file beside its frames, at most
+SHARE = 0.04  # most of the time that a growing file, or checkpoints, may take; they wait where frames come faster [-]
 _HEADERS = (
     "earliest",
     "v110",
@@ -68,7 +68,7 @@ class _Stones:
         stone, kinds, sizes, nodes, offset = [], [], [], [], 0
         for number, body in enumerate(bodies):
             rows = body.cells if body.element is not None else [np.array(face) for face in body.faces]
-            kind = CELL_TYPES[body.element] if body.element is not None else POLYGON
+            kind = CELL_TYPES[body.element] if body.element is not None else CellType.POLYGON
             stone += [number] * len(rows)
             kinds += [kind] * len(rows)
             sizes += [len(row) for row in rows]
@@ -108,7 +108,7 @@ class _ContactPoints:
         contacts, count = frame.contacts, len(frame.contacts.gap)
         arrays: dict[str, NDArray[Any]] = {
             "Points": contacts.point,
-            "Types": np.full(count, VERTEX, dtype=np.uint8),
+            "Types": np.full(count, CellType.VERTEX, dtype=np.uint8),
             "Offsets": np.arange(count + 1, dtype=np.int32),
             "PointData/status": status_numbers(contacts).astype(np.uint8),
             "PointData/bodies": contacts.bodies.astype(np.int32),
@@ -275,7 +275,7 @@ def _begin(
     import h5py
 
     with h5py.File(
-        "image", "w", driver="core", backing_store=False, block_size=_ROOM, libver=_HEADERS
+        "image", "w", driver="core", backing_store=False, block_size=ROOM, libver=_HEADERS
     ) as file:
         _Writer(file, blocks, parts).create(_parts_of(blocks, first))
         file.flush()
@@ -299,7 +299,7 @@ def _add(
     least = sum(max(array.nbytes, _CHUNK) for block in new[-1].values() for array in block.arrays.values())
     with path.open("r+b") as room:
         if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(room.fileno(), 0, path.stat().st_size + 2 * (size + least) + _ROOM)
+            os.posix_fallocate(room.fileno(), 0, path.stat().st_size + 2 * (size + least) + ROOM)
     with h5py.File(path, "r+", libver=_HEADERS, locking=False) as file:
         writer = _Writer(file, blocks, parts)
         for frame, written in zip(frames, new, strict=True):
@@ -349,7 +349,7 @@ class GrowingResults:
         OSError, RuntimeError : the file cannot be written; what was there can still be read
         """
         began = time.perf_counter()
-        if began - self._ended < self._took / _SHARE:
+        if began - self._ended < self._took / SHARE:
             return
         hidden, count = list(self._copies.items())[-1]
         _add(hidden, self._blocks, self._frames[count:], None)

@@ -5,6 +5,7 @@ import struct
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from html import escape
 from pathlib import Path
 
@@ -14,14 +15,27 @@ from numpy.typing import NDArray
 from mechanics.arrays import Array, Ints
 from mechanics.stones.meshing.elements import Element
 
-# cell types of VTK
-VERTEX, LINE, POLYGON, POLYHEDRON = 1, 3, 7, 42
-CELL_TYPES: Mapping[Element, int] = {
-    Element.TET4: 10,
-    Element.TET10: 24,
-    Element.HEX8: 12,
-    Element.HEX20: 25,
-    Element.HEX27: 29,
+
+class CellType(IntEnum):
+    """Cell types of VTK, by its names."""
+
+    VERTEX = 1
+    LINE = 3
+    POLYGON = 7
+    TETRA = 10
+    HEXAHEDRON = 12
+    QUADRATIC_TETRA = 24
+    QUADRATIC_HEXAHEDRON = 25
+    TRIQUADRATIC_HEXAHEDRON = 29
+    POLYHEDRON = 42
+
+
+CELL_TYPES: Mapping[Element, CellType] = {
+    Element.TET4: CellType.TETRA,
+    Element.TET10: CellType.QUADRATIC_TETRA,
+    Element.HEX8: CellType.HEXAHEDRON,
+    Element.HEX20: CellType.QUADRATIC_HEXAHEDRON,
+    Element.HEX27: CellType.TRIQUADRATIC_HEXAHEDRON,
 }
 
 Arrays = Mapping[str, NDArray[np.generic]]

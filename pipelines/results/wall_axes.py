@@ -1,5 +1,6 @@
 """Axes of a wall, as an engineer at its foot sees it: along the wall, outwards, and the height above its foot."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -8,8 +9,11 @@ import numpy as np
 
 from mechanics.arrays import Array
 from mechanics.results.result import BodyResult
+from survey.conventions import ONE_WAY
 
-_ONE_WAY = 0.87  # cos 30°: length of the mean level normal from which faces look one way, as those of a façade do [-]
+_ONE_WAY = math.cos(
+    ONE_WAY
+)  # cos 30°: length of the mean level normal from which faces look one way, as those of a façade do [-]
 _ALONG = 0.996  # cos 5°: a direction within it of an axis has the name of the axis [-]
 
 

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from archmodel.relations.members import StructureMembers
 from archmodel.store.stone_record import StoneRecord
 from ground.toml.keys import typed_values
+from ground.units import KILO
 from mechanics.arrays import Array
 from mechanics.scene.scene import Block, Fidelity, LawRule, Part, Scene
 from mechanics.scene.stages import Stage
@@ -33,7 +34,7 @@ from survey.simplify.simplify import BlockyStone
 
 _FAR = 10_000.0
 """Largest coordinates that are exact enough without a shift [m]."""
-_GRID = 1_000.0
+_GRID = KILO
 """Origins are multiples of this, so that the shift is easy to read [m]."""
 _PLACES = ("point", "pivot")
 """Values of a scene's entries that are points in the frame of the site."""

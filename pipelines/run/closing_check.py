@@ -8,10 +8,9 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.run.filling import LeafReport, leaf_report
+from pipelines.run.soundness import DEEP
 from survey.joints.report import ClosingReport
 from survey.simplify.simplify import BlockyStone
-
-_DEEP = 0.005  # measured overlap of two stones [m]; deeper ones should be looked at
 
 
 @dataclass(frozen=True)
@@ -189,7 +188,7 @@ def joints_report(
                 joint.stones, joint.width, joint.area, _place(joint.centroid + origin), "closed half-way"
             )
             for joint in sorted(closed, key=lambda joint: joint.width)
-            if joint.width < -_DEEP and not hypotheses & set(joint.stones)
+            if joint.width < -DEEP and not hypotheses & set(joint.stones)
         ),
         gaps=tuple(
             GapPlace(gap.stones, gap.width, gap.area, _place(gap.centroid + origin), gap.reason)

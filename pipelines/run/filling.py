@@ -8,11 +8,11 @@ import numpy as np
 from mechanics.arrays import Array
 from pipelines.run.assemble import Assembly
 from pipelines.scene.file import SceneFile
+from survey.conventions import LISTED
 from survey.geometry.solids import Solid, volume_of
 from survey.joints.grown_leaf import GrownLeaf, Opening
 from survey.joints.report import StoneJoint
 
-_NAMED = 5  # pairs of stones, and openings, that are named
 _SURROUNDED = 3  # sides of the frame that an opening about the wall reaches
 _REACHED = {"left": "the left side", "below": "the foot", "right": "the right side", "above": "the top"}
 _CHANGED = 5e-4  # share of the volume below which a change rounds to nothing in words [-]
@@ -102,8 +102,8 @@ class LeafReport:
             f"{1e3 * self.thickest:.1f} mm; stones grew by {1e3 * self.growth:.1f} mm at most (stone {self.farthest})",
         ]
         if self.crossing:
-            pairs = ", ".join(" and ".join(pair) for pair in self.crossing[:_NAMED])
-            more = ", …" if len(self.crossing) > _NAMED else ""
+            pairs = ", ".join(" and ".join(pair) for pair in self.crossing[:LISTED])
+            more = ", …" if len(self.crossing) > LISTED else ""
             lines.append(
                 f"{len(self.crossing)} pairs of outlines touch or cross: {pairs}{more}; look at them"
             )
@@ -111,9 +111,9 @@ class LeafReport:
 
     def open_in_words(self) -> tuple[str, ...]:
         """Return what stays open as lines for a person."""
-        lines = [f"an opening stays open: {opening.in_words()}" for opening in self.openings[:_NAMED]]
-        if len(self.openings) > _NAMED:
-            rest = self.openings[_NAMED:]
+        lines = [f"an opening stays open: {opening.in_words()}" for opening in self.openings[:LISTED]]
+        if len(self.openings) > LISTED:
+            rest = self.openings[LISTED:]
             lines.append(
                 f"{len(rest)} more openings, {sum(opening.area for opening in rest):.3g} m² in all, stay open"
             )

@@ -18,8 +18,7 @@ from pipelines.run.record import settings_of
 from pipelines.scene.array_tables import describe
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import Groups, StoneModel
-
-_MAX_NAMED = 4  # surveys, sources of depths, gaps and overlaps that are named
+from survey.conventions import LISTED
 
 
 def scene_inputs(
@@ -96,8 +95,8 @@ def closing_lines(report: JointsReport) -> tuple[str, ...]:
     lines += [f"{number} left open: {reason}" for reason, number in report.left_open.items()]
     for name, places in (("gaps", report.gaps), ("overlaps", report.overlaps)):
         if places:
-            shown = ", ".join(" and ".join(place.stones) for place in places[:_MAX_NAMED])
-            lines.append(f"{len(places)} {name}: {shown}{', …' if len(places) > _MAX_NAMED else ''}")
+            shown = ", ".join(" and ".join(place.stones) for place in places[:LISTED])
+            lines.append(f"{len(places)} {name}: {shown}{', …' if len(places) > LISTED else ''}")
     if report.alone:
         lines.append(f"{len(report.alone)} stones without a joint, e.g. {report.alone[0]}")
     return tuple(lines)
@@ -108,13 +107,13 @@ def _surveys(session: Session, codes: Iterable[str]) -> Iterator[str]:
     wanted = set(codes)
     rows = session.execute(select(Entity.code, Survey).join(Entity.measurement).join(Measurement.survey))
     counts = Counter(survey for code, survey in rows if code in wanted)
-    for survey, count in counts.most_common(_MAX_NAMED):
+    for survey, count in counts.most_common(LISTED):
         yield (
             f"{survey.name}: {count} stones; {survey.path}, taken in on {survey.entry.recorded_at:%Y-%m-%d} "
             f"(SHA-256 {survey.sha256[:12]}…)"
         )
-    if len(counts) > _MAX_NAMED:
-        yield f"and {len(counts) - _MAX_NAMED} more"
+    if len(counts) > LISTED:
+        yield f"and {len(counts) - LISTED} more"
 
 
 def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
@@ -122,15 +121,15 @@ def _depths(models: Iterable[StoneModel]) -> Iterator[str]:
     sources: dict[str, list[StoneRecord]] = {}
     for model in models:
         sources.setdefault(model.record.depth_source, []).append(model.record)
-    for source, records in sorted(sources.items(), key=lambda item: -len(item[1]))[:_MAX_NAMED]:
+    for source, records in sorted(sources.items(), key=lambda item: -len(item[1]))[:LISTED]:
         depths = [record.depth for record in records]
         least, most = (f"{value:.3g}" for value in (min(depths), max(depths)))
         span = least if least == most else f"{least} to {most}"
         sigmas = [record.depth_sigma for record in records if record.depth_sigma is not None]
         uncertainty = f"σ up to {1e3 * max(sigmas):.2g} mm" if sigmas else "taken as certain"
         yield f"{source or 'source not stated'}, {len(records)} stones: {span} m, {uncertainty}"
-    if len(sources) > _MAX_NAMED:
-        yield f"and {len(sources) - _MAX_NAMED} more sources"
+    if len(sources) > LISTED:
+        yield f"and {len(sources) - LISTED} more sources"
 
 
 def _material(material: Material, count: int) -> str:

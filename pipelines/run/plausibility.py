@@ -1,24 +1,26 @@
 """Values and corners that no stone or scene can have, and those that deserve a second look, before it is built."""
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
+from ground.units import GRAVITY, KILO
 from mechanics.arrays import Array, Ints
 from mechanics.scene.scene import Fidelity
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
+from survey.conventions import JOINT, LISTED, PARALLEL, TENTH
 from survey.quality.corners import SeenFace, misplaced_corners
-from survey.quality.plausible import DENSITY, FRICTION, LENGTH, POISSON, YOUNG, Doubt, doubt_of
+from survey.records.plausible import DENSITY, FRICTION, LENGTH, POISSON, YOUNG, Doubt, doubt_of
 from survey.records.survey import OUTLINE_NOTE
 
-_SHOWN = 6  # most findings of one sort that are named
-_HEADERS = 0.1  # share of a façade's area whose stones reach through the leaf, as headers do, at least [-]
+_HEADERS = TENTH  # share of a façade's area whose stones reach through the leaf, as headers do, at least [-]
 _THIN = 0.8  # depth over that of the leaf below which a stone leaves a void behind it: backs are hewn to a tenth [-]
-_BEHIND = 0.01  # by which a stone must reach farther back to lie behind another: a joint [m]
-_SQUARE = 10.0  # angle of faces that belong to one façade [°]
+_BEHIND = JOINT  # by which a stone must reach farther back to lie behind another: a joint [m]
+_SQUARE = math.degrees(PARALLEL)  # angle of faces that belong to one façade [°]
 _MANY_STEPS = 1e7  # an hour for the smallest scenes, at 0.3 ms for a step
 _ENDLESS_STEPS = 1e9  # days even for a single stone
 _LONG_STEP = 0.05  # in which a falling stone moves by its joint's width and more: g h² = 25 mm [s]
@@ -47,8 +49,8 @@ def corner_warnings(models: Sequence[StoneModel]) -> list[str]:
         [_seen(stone) for stone in measured if OUTLINE_NOTE not in stone.record.notes]
     )
     texts = [f"stone {corner.code}: {corner.text}; measure its corners again" for corner in corners]
-    remaining = len(texts) - _SHOWN
-    return [*texts[:_SHOWN], *([f"{remaining} more signs of corners out of place"] if remaining > 0 else [])]
+    remaining = len(texts) - LISTED
+    return [*texts[:LISTED], *([f"{remaining} more signs of corners out of place"] if remaining > 0 else [])]
 
 
 def depth_warnings(models: Sequence[StoneModel]) -> list[str]:
@@ -93,8 +95,8 @@ def _thin(records: Sequence[StoneRecord], facade: Ints, outwards: Array) -> list
             void.append((records[row].code, deep))
     if not void:
         return []
-    named = ", ".join(f"{code} {deep:.2f} m" for code, deep in void[:_SHOWN])
-    more = f" and {len(void) - _SHOWN} more" if len(void) > _SHOWN else ""
+    named = ", ".join(f"{code} {deep:.2f} m" for code, deep in void[:LISTED])
+    more = f" and {len(void) - LISTED} more" if len(void) > LISTED else ""
     count = f"{len(void)} stones are" if len(void) > 1 else "1 stone is"
     return [
         f"{count} thinner than the wall, {leaf:.2f} m, with nothing behind: {named}{more}; the void counts as empty: "
@@ -130,7 +132,7 @@ def _of_steps(scene: SceneFile) -> Iterator[tuple[str, Doubt]]:
         yield text, Doubt(text, count >= _ENDLESS_STEPS)
     if step > _LONG_STEP:
         text = (
-            f"{where}: in a step of {step:g} s a stone falls by {9.81e3 * step**2:.0f} mm; "
+            f"{where}: in a step of {step:g} s a stone falls by {KILO * GRAVITY * step**2:.0f} mm; "
             "usual steps are 0.5 to 10 ms"
         )
         yield text, Doubt(text, False)

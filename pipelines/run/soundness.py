@@ -11,13 +11,13 @@ from mechanics.scene.scene import Fidelity, Scene
 from pipelines.run.assemble import Assembly
 from pipelines.run.plausibility import impossible_values
 from pipelines.scene.file import SceneFile
+from survey.conventions import LISTED, PER_MILLE
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import check_watertight, doubtful_solids
 from survey.joints.settings import JointMode
 
-_DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
-_LEVEL = 1e-3  # over the height of all stones, by which bottoms in one level differ [-]
-_NAMED = 6  # most stones, or pairs of stones, that one problem names
+DEEP = 0.005  # overlap [m]; less is survey noise, which the contacts absorb
+_LEVEL = PER_MILLE  # over the height of all stones, by which bottoms in one level differ [-]
 
 
 def problems_of(scene: SceneFile, assembly: Assembly, loose: Sequence[str]) -> tuple[str, ...]:
@@ -142,10 +142,10 @@ def _alone(assembly: Assembly) -> list[str]:
 
 def _overlapping(assembly: Assembly) -> list[str]:
     """Report stones that initially overlap deeply and would be driven apart."""
-    deep = [overlap for overlap in assembly.closing.overlaps if overlap.depth > _DEEP]
+    deep = [overlap for overlap in assembly.closing.overlaps if overlap.depth > DEEP]
     return [
         f"{' and '.join(pair.stones)} lie {pair.depth * 1e3:.0f} mm in each other; measure them again, or exclude one"
-        for pair in sorted(deep, key=lambda overlap: -overlap.volume)[:_NAMED]
+        for pair in sorted(deep, key=lambda overlap: -overlap.volume)[:LISTED]
     ]
 
 
@@ -190,8 +190,8 @@ def unsupported_stages(scene: SceneFile, assembly: Assembly) -> list[str]:
 
 def some(codes: Sequence[str]) -> str:
     """Return the first codes, and how many others there are."""
-    more = f" and {len(codes) - _NAMED} more" if len(codes) > _NAMED else ""
-    return ", ".join(codes[:_NAMED]) + more
+    more = f" and {len(codes) - LISTED} more" if len(codes) > LISTED else ""
+    return ", ".join(codes[:LISTED]) + more
 
 
 def _facts(problems: Sequence[str]) -> str:

@@ -16,13 +16,12 @@ from mechanics.results.result import BodyResult, Frame
 from mechanics.scene.scene import Block
 from pipelines.results.checkpoints import Checkpoint, Checkpoints, write_whole
 from pipelines.results.folder import RUN_INDEX, UNFINISHED, locked
-from pipelines.results.vtkhdf import RESULTS, GrowingResults
+from pipelines.results.vtkhdf import RESULTS, SHARE, GrowingResults
 from pipelines.scene.fingerprint import changes
 from pipelines.scene.settings import Output, ParaView
+from survey.conventions import LISTED
 
 _INPUTS = "inputs.json"
-_SHARE = 0.04  # most of the time that checkpoints may take; those that would take more are left out [-]
-_NAMED = 4  # changes that an error names
 
 _STORED_ENDINGS = (
     ".h5",
@@ -137,9 +136,9 @@ class UnfinishedRun:
         if carried.step >= duration:
             forbidden.append(f"duration: the run has done {carried.step} steps, {duration} are asked for")
         if forbidden:
-            more = f", and {len(forbidden) - _NAMED} more" if len(forbidden) > _NAMED else ""
+            more = f", and {len(forbidden) - LISTED} more" if len(forbidden) > LISTED else ""
             raise UsageError(
-                f"the scene is not that of the unfinished run: {'; '.join(forbidden[:_NAMED])}{more}",
+                f"the scene is not that of the unfinished run: {'; '.join(forbidden[:LISTED])}{more}",
                 where=where,
                 remedy="undo the change, or begin again with --restart",
             )
@@ -192,7 +191,7 @@ class UnfinishedRun:
     def checkpoint(self, step: int, carried: Carried) -> None:
         """Write a checkpoint; a disk that is full is no reason to give up the run."""
         began = time.perf_counter()
-        if began - self._ended < self._took / _SHARE and step % self.every == 0:
+        if began - self._ended < self._took / SHARE and step % self.every == 0:
             return
         try:
             self._checkpoints.write(step, carried, {"versions": self._versions, "resumed": self.resumed})

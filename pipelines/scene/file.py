@@ -17,6 +17,7 @@ from ground.settings import Setting
 from ground.toml.keys import Stones, Vector, build, keys_of, typed_values
 from ground.toml.lines import key_lines, parse_toml, read_text
 from ground.toml.schema import Key, TomlDocument, check_table, nearest
+from ground.units import GRAVITY
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.scene import ContactSettings, Fidelity, SolverSettings, TimeSettings
 from mechanics.stones.materials import Material, Orthotropy
@@ -53,7 +54,7 @@ class _Title:
 class _Gravity:
     """Table [gravity]."""
 
-    magnitude: Annotated[float, Setting("Acceleration of gravity.", "m/s²", at_least=0)] = 9.81
+    magnitude: Annotated[float, Setting("Acceleration of gravity.", "m/s²", at_least=0)] = GRAVITY
     direction: Annotated[
         Vector, Setting("Direction in which things fall; its length does not matter.", "-")
     ] = (0.0, 0.0, -1.0)

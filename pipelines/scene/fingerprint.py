@@ -16,7 +16,7 @@ from pipelines.scene.selection import StoneModel
 
 _STONE = "stone "
 _SHOWN = 9  # numbers up to which an array stands in full
-_DIGITS = 16  # of the digest of a larger one
+DIGITS = 16  # of the digest of a larger one
 _FREE = ("name", "solver.threads", "time.duration")  # settings that change no bit of the steps done so far
 
 
@@ -131,7 +131,7 @@ def digest(value: Any) -> str:
     sha256 = hashlib.sha256()
     for byte in _bytes(value):
         sha256.update(byte)
-    return f"#{sha256.hexdigest()[:_DIGITS]}"
+    return f"#{sha256.hexdigest()[:DIGITS]}"
 
 
 def _bytes(value: Any) -> Iterator[bytes]:

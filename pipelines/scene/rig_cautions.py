@@ -9,13 +9,14 @@ from mechanics.scene.laws.law import Law
 from mechanics.scene.rig import Rig
 from mechanics.scene.scene import Scene
 from mechanics.stones.polyhedra import mass_properties
+from survey.conventions import SAME
 
 # stiffness of dry joints above all that were measured in a first loading, 5.9 to 12.9 GPa/m up to 1.25 MPa [Pa/m]
 _STIFF_DRY = 15e9
 # mean pressure above which measured dry walls lost force after their peak [Pa]
 _PRESSED_DRY = 0.5e6
 # of lengths and forces, over themselves [-]
-_SIZE_ROUNDING = 1e-6
+_SIZE_ROUNDING = SAME
 
 
 def rig_cautions(stones: Scene, rig: Rig, step: float | None) -> list[str]:

@@ -9,12 +9,13 @@ import numpy as np
 from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tradeoff.worker import SHORT
+from survey.conventions import LARGELY
 
 _USUAL_POWER = 1.5  # of the unknowns, by which time grows, until it has been measured
 _POWERS = (1.0, 2.5)  # bounds of the measured power: sparse factors of walls and of solid masonry
 _MEMORY_POWER = 1.3  # of the unknowns, by which memory grows
 _START = 3.0  # start of a process and reading of its input, until it has been measured [s]
-_MODELS_SHARE = 0.7  # share of the budget for models of the stones, before their variants
+_MODELS_SHARE = LARGELY  # share of the budget for models of the stones, before their variants
 _PATIENCE = 2.0  # a run is stopped when it takes this many times as long as expected,
 _LEAST_SHARE = 1.0 / 6.0  # but not before this share of the budget is spent on it
 _UNKNOWN_SHARE = 1.0 / 3.0  # share of the budget for a run without a forecast

@@ -13,12 +13,14 @@ from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import SceneFile
 from pipelines.tuning.overlay import Overlay
 from pipelines.tuning.profiles import PROFILES
+from survey.conventions import FINEST, LEAST, PER_CENT, THINNEST
 
+_MESHES = (1, 2, 3, 4, 6)
 _CELLS = {
-    Element.TET4: (1, 2, 3, 4, 6),
-    Element.HEX8: (1, 2, 3, 4, 6),
-    Element.TET10: (1, 2, 3, 4),
-    Element.HEX20: (1, 2, 3, 4),
+    Element.TET4: _MESHES,
+    Element.HEX8: _MESHES,
+    Element.TET10: _MESHES[:-1],
+    Element.HEX20: _MESHES[:-1],
 }
 """Cells across the typical smallest width of a stone, by element. Hex27 has more nodes than hex20 to the same order."""
 
@@ -40,9 +42,9 @@ _RIGID = Overlay(fidelity=Fidelity.RIGID)
 _PLAIN = (Overlay(), _RIGID)
 _LINEAR = 4.0  # time of linear over quadratic elements of as many unknowns: contacts need more iterations [-]
 _LOOSER = 100.0  # factor on tolerances of looser variants [-]
-_TIGHTER = 0.01  # factor on tolerances of tighter variants [-]
-_LOOSEST = 1e-2  # largest tolerance; beyond it, contacts no longer obey their laws [-]
-_MOTION_ERRORS = (1e-5, 1e-4, 1e-3)  # of the motion of rigid stones [m]
+_TIGHTER = 1.0 / _LOOSER  # factor on tolerances of tighter variants [-]
+_LOOSEST = PER_CENT  # largest tolerance; beyond it, contacts no longer obey their laws [-]
+_MOTION_ERRORS = (THINNEST, FINEST, LEAST)  # of the motion of rigid stones [m]
 _PROFILE = "profile"  # first word of the names of profiles
 
 

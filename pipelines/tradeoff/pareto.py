@@ -8,8 +8,9 @@ from pipelines.results.quantities import QUANTITIES, differences
 from pipelines.tradeoff.grid import Variant
 from pipelines.tradeoff.store import Measured, Status
 from pipelines.tuning.overlay import Overlay
+from survey.conventions import SOME
 
-_CHANCE = 1.25  # ratio of processor times of the same work, run after run on a busy machine [-]
+_CHANCE = 1.0 + SOME  # ratio of processor times of the same work, run after run on a busy machine [-]
 _SOLVER_ERRORS = ("natural_map", "penetration", "balance", "reaction", "energy")
 _COARSER = 1.2  # least ratio of sizes at which one mesh gives an error estimate of another [-]
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from survey.conventions import TENTH
+
 _COLOURS = {
     "as written": "#222222",
     "rigid": "#6b7a2a",
@@ -18,7 +20,7 @@ _COLOURS = {
 _COLOUR = "#8e6c8a"
 _FRONT, _BAND = "#555555", "#dddddd"
 _AXIS_MINIMUM = 1e-7  # a logarithmic axis has no zero
-_HIDDEN = 0.1  # share of the error of the reference at which smaller errors are drawn [-]
+_HIDDEN = TENTH  # share of the error of the reference at which smaller errors are drawn [-]
 _COLUMNS = 3
 
 

@@ -25,6 +25,7 @@ from pipelines.tradeoff.scheduler import Limits, carry_out
 from pipelines.tradeoff.store import Store, study_key
 from pipelines.tradeoff.worker import Job
 from pipelines.tuning.overlay import typical_width
+from survey.conventions import FEW
 
 _STRESS = "von_mises"  # names of quantities with this in them are stresses
 _MEMORY_SHARE = 0.8  # share of the memory of the machine that runs may take together [-]
@@ -45,7 +46,7 @@ class Asked:
 
     budget: float = 600.0
     jobs: int = 1
-    error: float = 0.05
+    error: float = FEW
     quantity: str | None = None
     accept_unsound: bool = False
 

@@ -11,6 +11,7 @@ from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 from pipelines.tuning.overlay import Overlay, overlaid, typical_width
+from survey.conventions import LEAST, THINNEST, TOUCHING
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ _FAST = Profile(
         tolerance=1e-5,
         # with a looser one, rigid stones in steps of this length miss a balance of 10⁻⁴ and never come to rest
         velocity_tolerance=1e-5,
-        motion_error=1e-3,
+        motion_error=LEAST,
         max_iterations=2000,
     ),
     step=0.002,
@@ -72,7 +73,7 @@ _BALANCED = Profile(
         method=Method.AUTO,
         tolerance=1e-6,
         velocity_tolerance=1e-4,
-        motion_error=1e-5,
+        motion_error=THINNEST,
         max_iterations=3000,
     ),
     step=0.001,
@@ -92,7 +93,7 @@ _ACCURATE = Profile(
         method=Method.AUTO,
         tolerance=1e-7,
         velocity_tolerance=1e-5,
-        motion_error=1e-6,
+        motion_error=TOUCHING,
         max_iterations=5000,
     ),
     step=0.0005,

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ground.errors import GeometryError, SurveyError, UsageError
-from ground.tables.columns import UNITS
+from ground.units import LENGTHS
 from survey.arrays import Array
 from survey.clouds._kernels.planes import COVERED, FEW, FINE, Rules, fit_patches, patch_sigmas
 from survey.clouds.collecting import Collected, collect_points
@@ -27,26 +27,23 @@ from survey.clouds.points.reading import open_points
 from survey.clouds.review import drawn_doubts, measured_doubts
 from survey.clouds.settings import CloudOptions
 from survey.clouds.wall import Wall
+from survey.conventions import CERTAIN, FARTHEST, FINEST, JOINT, MAX_ROUNDS, MOST, SIGNIFICANT, SOME, WEAR
 from survey.formats.fields import CODE
 from survey.geometry.solids import area_vector
-from survey.quality.plausible import question_of_unit
+from survey.records.plausible import question_of_unit
 from survey.records.review import Doubtful
 from survey.records.survey import OBSERVER, BlockRecord, Reject, Station, SurveyHead, SurveyStream
 
 Progress = Callable[[int, int | None], None]
 """A function that is told how many points are read, and how many there are."""
 
-_WIDE = 3.0  # standard deviations of an outline within which its edge lies
-_ON_PLANE_SIGMAS = 4.0  # standard deviations of a point within which it lies on a plane
-_NEAREST = 0.008  # the same for a very precise scan: stones are rough [m]
-_BAND = 0.025  # roughness of a dressed face from its plane [m]
-_MIN_PATCH_SIGMA = 0.0001  # standard deviation of a patch: no scanner is better [m]
-_LARGEST_CORRELATION = 0.6  # of neighbouring patches: beyond, they are one
+_WIDE = SIGNIFICANT  # standard deviations of an outline within which its edge lies
+_ON_PLANE_SIGMAS = CERTAIN  # standard deviations of a point within which it lies on a plane
+_NEAREST = JOINT  # the same for a very precise scan: stones are rough [m]
+_BAND = WEAR  # roughness of a dressed face from its plane [m]
+_LARGEST_CORRELATION = MOST  # of neighbouring patches: beyond, they are one
 _PRIOR = 50.0  # pairs of patches without correlation, as if they had been seen before
-_MAX_ITERATIONS = 5  # until the correlation and what a fit takes of it agree
-_SHIFTED = 1000.0  # distance of a cloud from its outlines that no slip of a frame makes [m]
-_AWAY = 10.0  # distance of the viewer of an orthophoto from the wall [m]
-_ROOM = 0.25  # part of the width of a stone that margins may take
+_ROOM = SOME  # part of the width of a stone that margins may take
 
 
 def open_cloud(
@@ -192,7 +189,7 @@ def _apart(
     reach = (
         options.slab + float(np.ptp([one.origin for one in placed], axis=0).max()) + max(map(_size, placed))
     )
-    for unit, length in UNITS.items():
+    for unit, length in LENGTHS.items():
         if length != 1.0 and np.linalg.norm(length * near - middle) <= reach < np.linalg.norm(near - middle):
             remedy = (
                 f"in {unit} it would lie there: export it in metres, or begin a text with the units of its columns, "
@@ -200,7 +197,7 @@ def _apart(
             )
             break
     else:
-        if np.abs((near - middle)[:2]).max() > _SHIFTED:
+        if np.abs((near - middle)[:2]).max() > FARTHEST:
             remedy += "; if the cloud was shifted, as by CloudCompare's global shift, export it with true coordinates"
     return SurveyError(what, where=str(options.outlines), remedy=remedy)
 
@@ -230,7 +227,7 @@ def viewed(head: SurveyHead, wall: Wall, middle: Array) -> SurveyHead:
                 "is right, exchange left and right of the frame",
             )
         return head
-    return replace(head, stations=(Station(OBSERVER, middle + _AWAY * wall.axes[2]),))
+    return replace(head, stations=(Station(OBSERVER, middle + FARTHEST * wall.axes[2]),))
 
 
 def _seen(
@@ -274,7 +271,7 @@ def _correlation(fitted: Sequence[_Fitted]) -> float:
         (plane.numbers[4:7] for plane in fitted if plane.status == FINE), np.array([0, 0, _PRIOR])
     )
     correlation = 0.0
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ROUNDS):
         factor = 1.0 + 4.0 * (correlation + correlation**1.414 + correlation**2) + 8.0 * correlation**2.236
         correlation = min(max((products + factor * hat) / pairs, 0.0), _LARGEST_CORRELATION)
     return float(correlation)
@@ -292,7 +289,7 @@ def _stones(
     rules = Rules(
         max(_ON_PLANE_SIGMAS * options.sigma, _NEAREST),
         max(_BAND, _ON_PLANE_SIGMAS * options.sigma),
-        _MIN_PATCH_SIGMA,
+        FINEST,
     )
     fitted = [_Fitted(*fit_patches(*collected.of(k), rules)) for k in range(len(placed))]
     correlation = _correlation(fitted)
@@ -325,7 +322,7 @@ def _record(
     attributes, rows = outline.outline.said, fitted.rows
     patch_sigma, worth = patch_sigmas(rows, fitted.cells, fitted.numbers, correlation)
     local = np.column_stack([outline.ring, outline.ring @ fitted.plane[:2] + fitted.plane[2]])
-    sigmas = np.concatenate([np.maximum(patch_sigma, _MIN_PATCH_SIGMA), np.full(len(local), sigma)])
+    sigmas = np.concatenate([np.maximum(patch_sigma, FINEST), np.full(len(local), sigma)])
     clear, count = fitted.numbers[2:4].tolist()
     notes = {
         "points": f"{int(count)} in {len(rows)} patches, as good as {worth:.0f} independent ones",

@@ -15,17 +15,18 @@ from survey.arrays import Array, Ints
 from survey.clouds._kernels.collect import Frames, Grid, Patches, Rings, Samples, collect
 from survey.clouds.placing import PlacedOutline
 from survey.clouds.points.chunks import PointCloud
+from survey.conventions import ENOUGH, JOINT, ROWS, SAMPLE, STEP
 
 _PATCHES = 36  # of a face: the fit of planes tells outliers apart best among 20 to 50 points
-_DENSE = 5  # points of a patch whose mean says something
-_MIN_PATCHES = 9  # patches from which a plane and its scatter are known
+_DENSE = ENOUGH  # points of a patch whose mean says something
+_MIN_PATCHES = SAMPLE  # patches from which a plane and its scatter are known
 _PATCH_POINTS = (
     24  # points of a patch: beyond, the mean of a patch is known better than its roughness lets it matter
 )
-_SMALLEST = 0.01  # side of a patch: less than the roughness of a stone is long [m]
+_SMALLEST = JOINT  # side of a patch: less than the roughness of a stone is long [m]
 _MAX_PATCHES = 144  # patches of a face that is much longer than high
-_CUBES = 2_000_000  # of space, 8 bytes each
-_FINEST = 0.02  # side of a cube [m]
+_CUBES = ROWS  # of space, 8 bytes each
+_FINEST = STEP  # side of a cube [m]
 
 
 @dataclass(frozen=True)

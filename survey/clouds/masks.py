@@ -1,5 +1,6 @@
 """From masks or outlines alone to the records of faces: one plane face for each stone, at a stated scale."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +11,13 @@ from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.cloud import first_codes, viewed, wrong_outlines
 from survey.clouds.outlines.outline import Outline
-from survey.clouds.outlines.reading import Drawing, read_outlines
+from survey.clouds.outlines.reading import DRAWN, Drawing, read_outlines
 from survey.clouds.placing import levelled, place_outlines
 from survey.clouds.review import drawn_doubts, flat_doubts
 from survey.clouds.settings import MaskOptions
 from survey.clouds.wall import Wall
 from survey.clouds.world import PixelPlace
+from survey.conventions import LEAST, NEGLIGIBLE, NOTICEABLE, STEEPEST
 from survey.records.review import Doubtful
 from survey.records.survey import (
     FRAME_NOTE,
@@ -27,12 +29,11 @@ from survey.records.survey import (
     SurveyStream,
 )
 
-_STRETCHED = 0.02  # by which the two sides of a pixel may differ before it is doubtful [-]
-_TWICE = 1.5  # standard deviations between two corners that are one
-_NEAREST = 0.001  # and metres
-_OVER = 0.005  # metres by which an outline may reach beyond the stated size before it is doubtful
-_UPRIGHT = Wall(np.zeros(3), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
-_AGREE = 0.5  # cosine between the normals of outlines that one viewer sees
+_STRETCHED = NEGLIGIBLE  # by which the two sides of a pixel may differ before it is doubtful [-]
+_TWICE = NOTICEABLE  # standard deviations between two corners that are one
+_OVER = DRAWN  # metres by which an outline may reach beyond the stated size before it is doubtful
+_UPRIGHT = Wall(np.array([0.0, 0.0, 0.0]), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
+_AGREE = math.cos(STEEPEST)  # cosine between the normals of outlines that one viewer sees
 _SOURCE = "stated for all outlines"
 
 
@@ -189,7 +190,7 @@ def _stones(
             yield Reject(outline.code, error, span)
             continue
         attributes = outline.said
-        corners = _distinct(outline.corners, max(_TWICE * sigma, _NEAREST))
+        corners = _distinct(outline.corners, max(_TWICE * sigma, LEAST))
         notes = dict(attributes.notes) | {OUTLINE_NOTE: how}
         if frame is not None:
             beyond = np.concatenate([corners.min(axis=0) - frame[0], frame[1] - corners.max(axis=0)])

@@ -1,5 +1,6 @@
 """Outlines in space: the plane of each, and the line of sight along which points are looked for."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,12 +10,12 @@ from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.wall import Wall
+from survey.conventions import STEEPEST, TOUCHING
 from survey.geometry.polygons import ring_area
 from survey.geometry.solids import area_vector
 from survey.records.survey import Station
 
-_LEVEL = 1e-6  # difference of heights of corners that have one elevation [m]
-_UPRIGHT = 0.5  # upward component of its normal below which a wall is upright
+_UPRIGHT = math.cos(STEEPEST)  # upward component of its normal below which a wall is upright
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def levelled(outlines: Sequence[Outline]) -> tuple[Outline, ...]:
     """Return outlines of which those at one elevation, as 2D polylines have it, lie in the plane of the drawing."""
     return tuple(
         replace(outline, corners=outline.corners[:, :2])
-        if outline.corners.shape[1] == 3 and np.ptp(outline.corners[:, 2]) <= _LEVEL
+        if outline.corners.shape[1] == 3 and np.ptp(outline.corners[:, 2]) <= TOUCHING
         else outline
         for outline in outlines
     )

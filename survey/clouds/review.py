@@ -12,24 +12,22 @@ from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Outline
 from survey.clouds.outlines.reading import PICTURES, Drawing
 from survey.clouds.placing import PlacedOutline
+from survey.conventions import ALIKE, FEW, GROUP, LARGELY, MOST, NEARLY, SAMPLE, SOME, STEP, WIDEST_JOINT
 from survey.geometry.polygons import ring_area, seamless
 from survey.records.review import Doubtful
 
-_OVERLAP = 0.05  # part of the smaller stone's area that two outlines may share: jitter of neighbours
-_WITHIN = 0.5  # of an outline's area in a larger one, above which it lies within this
-_FRAMED = 3  # outlines that a frame holds at least
-_JOINT = 0.05  # widest joint between two outlines [m]
-_THICK = 0.02  # by which boxes of outlines are widened: neighbours do not lie in one plane [m]
-_SOLID = (
-    0.80  # area over that of the convex hull below which an outline leaks: a stone with a deep notch has more
-)
+_OVERLAP = FEW  # part of the smaller stone's area that two outlines may share: jitter of neighbours
+_WITHIN = MOST  # of an outline's area in a larger one, above which it lies within this
+_FRAMED = GROUP  # outlines that a frame holds at least
+_THICK = STEP  # by which boxes of outlines are widened: neighbours do not lie in one plane [m]
+_SOLID = NEARLY  # area over that of the convex hull below which an outline leaks: a stone with a deep notch has more
 _ODD = 4.5  # robust standard deviations of the logarithm of the area beyond which a size is odd
-_SPREAD = 0.25  # least standard deviation of that logarithm, since stones of one course differ by more
-_MIN_OUTLINES = 12  # outlines from which sizes have a usual range
-_UNSURE = 0.5  # score below which a program is not sure of a mask
+_SPREAD = SOME  # least standard deviation of that logarithm, since stones of one course differ by more
+_MIN_OUTLINES = SAMPLE  # outlines from which sizes have a usual range
+_UNSURE = MOST  # score below which a program is not sure of a mask
 _FEW_POINTS = 100  # points of a stone that is hardly measured
-_COVERED = 0.7  # share of clear patches below which something covers a stone, or its mask leaks
-_TURNED = 20.0  # angle of a face from the plane of its outline [degrees]
+_COVERED = LARGELY  # share of clear patches below which something covers a stone, or its mask leaks
+_TURNED = ALIKE  # angle of a face from the plane of its outline [degrees]
 
 
 def drawn_doubts(placed: Sequence[PlacedOutline], drawing: Drawing) -> list[Doubtful]:
@@ -97,7 +95,7 @@ def _seams(
 ) -> Iterator[Doubtful]:
     """Yield pairs of outlines without a joint between them, where others have one."""
     upright = [ring if ring_area(ring) > 0.0 else ring[::-1] for ring in rings]
-    near = _near_pairs(low - 0.5 * _JOINT, high + 0.5 * _JOINT)
+    near = _near_pairs(low - 0.5 * WIDEST_JOINT, high + 0.5 * WIDEST_JOINT)
     for pair in seamless(upright, [(int(i), int(j)) for i, j in near]):
         second = outlines[pair.second]
         text = (
@@ -123,7 +121,7 @@ def measured_doubts(outline: PlacedOutline, plane: Array, numbers: Array) -> Ite
     if clear < _COVERED:
         text = f"{clear:.0%} of its patches are clear: something covers it, or its mask reaches beyond it"
         yield Doubtful(code, "covered", text, where)
-    if (turned := float(np.degrees(np.arctan(np.hypot(*plane[:2]))))) > _TURNED:
+    if (turned := float(np.arctan(np.hypot(*plane[:2])))) > _TURNED:
         yield Doubtful(
             code, "turned", f"its face is turned {turned:.0f}° from the plane of its outline", where
         )

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ground.errors import UsageError
+from survey.clouds.outlines.reading import DRAWN, SMOOTH
 from survey.clouds.wall import Wall
+from survey.conventions import LEAST, SMALL_STONE
 from survey.formats.options import ReadingOptions
 
 MASONRY = ("auto", "ashlar", "coursed", "brick", "rubble")
@@ -36,10 +38,10 @@ class CloudOptions(ReadingOptions):
     layer: str | None = None
     chosen: Mapping[str, str] = field(default_factory=dict)
     outline_unit: float | None = None
-    outline_sigma: float = 0.005
+    outline_sigma: float = DRAWN
     margin: float | None = None
-    slab: float = 0.15
-    smooth: float = 1.5
+    slab: float = SMALL_STONE
+    smooth: float = SMOOTH
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,8 @@ class MaskOptions(ReadingOptions):
     wall: Wall | None = None
     layer: str | None = None
     chosen: Mapping[str, str] = field(default_factory=dict)
-    outline_sigma: float = 0.001
-    smooth: float = 1.5
+    outline_sigma: float = LEAST
+    smooth: float = SMOOTH
 
 
 @dataclass(frozen=True)

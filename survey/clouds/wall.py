@@ -17,12 +17,13 @@ import numpy as np
 
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
+from survey.conventions import PER_MILLE
 from survey.quality.facades import WallPlane
 
 Wall = WallPlane
 """Frame of a wall: origin, and axes to the right, up and outwards."""
 
-_SQUARE = 0.001  # cosine between axes up to which they were rounded, not meant to be oblique
+_SQUARE = PER_MILLE  # cosine between axes up to which they were rounded, not meant to be oblique
 _EXAMPLE = "write: origin = [X, Y, Z], right = [DX, DY, DZ], up = [DX, DY, DZ]"
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,11 @@ import numpy as np
 from ground.errors import SurveyError
 from survey.arrays import Array
 
-_SCALE, _TIE, _MATRIX = 33550, 33922, 34264
-"""Tags of GeoTIFF: size of a pixel, a tie point, a matrix."""
+
+class _Tag(IntEnum):
+    """Tags of GeoTIFF: size of a pixel, a tie point, a matrix."""
+
+    SCALE, TIE, MATRIX = 33550, 33922, 34264
 
 
 @dataclass(frozen=True)
@@ -64,11 +68,11 @@ def world_of(picture: Path, tags: Mapping[int, tuple[float, ...]] | None = None)
     for path in endings:
         if path.is_file():
             return _read(path)
-    if tags and _MATRIX in tags:
-        m = np.array(tags[_MATRIX], dtype=np.float64).reshape(4, 4)
+    if tags and _Tag.MATRIX in tags:
+        m = np.array(tags[_Tag.MATRIX], dtype=np.float64).reshape(4, 4)
         return _of_corner(m[:2, :2], m[:2, 3])
-    if tags and _SCALE in tags and _TIE in tags:
-        scale, tie = tags[_SCALE], tags[_TIE]
+    if tags and _Tag.SCALE in tags and _Tag.TIE in tags:
+        scale, tie = tags[_Tag.SCALE], tags[_Tag.TIE]
         matrix = np.diag([scale[0], -scale[1]])
         return _of_corner(matrix, np.array(tie[3:5]) - matrix @ np.array(tie[:2]))
     return None

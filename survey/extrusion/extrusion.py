@@ -7,6 +7,7 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import STEEPEST
 from survey.extrusion._kernels import FacePlane, HiddenSide, corner_deviations
 from survey.extrusion.depth import Depth
 from survey.faces.faces import Face
@@ -14,7 +15,7 @@ from survey.geometry.solids import Solid
 from survey.records.survey import Extrusion
 
 _STRAIGHT = Extrusion()
-_FLATTEST = np.cos(np.radians(60.0))  # a direction farther from the normal leaves a sliver, not a stone
+_FLATTEST = np.cos(STEEPEST)  # a direction farther from the normal leaves a sliver, not a stone
 
 
 @dataclass(frozen=True)

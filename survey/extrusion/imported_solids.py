@@ -6,6 +6,7 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import PER_CENT, TENTH, TOUCHING
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.faces import Provenance, face_on
@@ -14,9 +15,8 @@ from survey.faces.shapes import FaceShape, ShapeKind
 from survey.geometry.solids import Solid, area_vector
 from survey.records.survey import BlockRecord, Extrusion, SolidRecord
 
-_UPRIGHT = 0.9  # slope (sine) of a normal beyond which the side is a bed or a top, not a face
-_ALIKE = 0.01  # relative difference of areas below which two sides may be front and back of one stone
-_SHALLOWEST = 1e-6  # least depth behind the face [m]
+_UPRIGHT = 1.0 - TENTH  # slope (sine) of a normal beyond which the side is a bed or a top, not a face
+_ALIKE = PER_CENT  # relative difference of areas below which two sides may be front and back of one stone
 _HAND = np.array([-0.11, -1.0, 0.013])  # side taken as the front then; aligned with hardly any wall
 
 
@@ -45,7 +45,7 @@ def block_of_solid(record: SolidRecord, viewpoint: Array | None, path: str) -> S
     side, normal = _visible_side(record, viewpoint)
     fit = _plane(side, normal)
     depth = float(((fit.centroid - record.vertices) @ normal).max())
-    if not depth > _SHALLOWEST:
+    if not depth > TOUCHING:
         raise GeometryError(
             f"it reaches {depth * 1e3:.2g} mm behind its largest side",
             remedy="check the solid, or give its viewpoint",

@@ -20,16 +20,15 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from survey.arrays import Array
+from survey.conventions import CORNERS, MANY, MAX_ITERATIONS, RARE
 from survey.faces.planes import FaceFit
 from survey.geometry.solids import plane_frame
 
 Indices = NDArray[np.intp]
 
 _MOST_STUDENT = 3.0  # ν/(ν - 2) where ν is 3; it does not exist for two
-_MAX_ITERATIONS = 50  # of the alternation between plane and variances; a dozen suffice
-_LEAST_FACES = 3  # a plane has three parameters
-_FEW_FACES = 30  # number of faces up to which they are examined one by one
-_LEVEL = 1e-3  # probability that some face of a wall is called an outlier by chance
+_LEAST_FACES = CORNERS  # a plane has three parameters
+_FEW_FACES = MANY  # number of faces up to which they are examined one by one
 
 
 @dataclass(frozen=True)
@@ -209,7 +208,7 @@ def _without_outliers(faces: _Faces) -> tuple[Indices, _Adjusted]:
             break
         best = _adjust(some.only(rest))
         tests = _predicted_residuals(some.only(np.flatnonzero(out)), best)
-        limit = float(stdtrit(best.freedom[0], 1.0 - 0.5 * _LEVEL / len(members)))
+        limit = float(stdtrit(best.freedom[0], 1.0 - 0.5 * RARE / len(members)))
         members = members[rest]
         if tests.min() > limit:
             answer = members, best
@@ -241,7 +240,7 @@ def _adjust(faces: _Faces) -> _Adjusted:
     step: Array = np.append(slopes.mean(axis=0), 0.0)
     step[2] = (heights - arms @ step).mean()
     freedom, before = (count - 1.0, 2.0 * count - 2.0), 0.0
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         squares = float(((heights - arms @ step) ** 2).sum()), float(((slopes - step[:2]) ** 2).sum())
         variances = max(squares[0] / freedom[0], least[0]), max(squares[1] / freedom[1], least[1])
         inverse = np.linalg.inv(by_heights / variances[0] + by_slopes / variances[1])

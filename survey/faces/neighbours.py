@@ -1,5 +1,6 @@
 """Spatial search among measured faces: the neighbours of a stone, and the faces of its wall."""
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -8,13 +9,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
+from survey.conventions import CORNERS, MOST, ONE_WAY
 from survey.faces.planes import FaceFit
 
 Indices = NDArray[np.intp]
 
-_SAME_WAY = float(np.cos(np.radians(30.0)))  # faces turned farther belong to another wall
-_ENOUGH = 3  # least number of neighbours that define a plane
-_REACH = 0.5  # largest distance of a neighbour, in sizes of the stone
+_SAME_WAY = math.cos(ONE_WAY)  # faces turned farther belong to another wall
+_ENOUGH = CORNERS  # least number of neighbours that define a plane
+_REACH = MOST  # largest distance of a neighbour, in sizes of the stone
 _LEANING = 0.03  # deviation of a wall from the plane of the marks, per distance from them
 
 

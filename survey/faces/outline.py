@@ -7,12 +7,12 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import FEW, LEAST, NOTICEABLE
 
 Point = tuple[float, float]
 
-_NEAREST = 1e-3  # corners nearer than this are one corner measured twice, however precise [m]
-_NOISE = 2.0  # so are corners nearer than this many standard deviations of a coordinate
-_LEVEL = 0.05  # sine of the angle between normal and vertical below which a face has no level direction
+_NOISE = NOTICEABLE  # so are corners nearer than this many standard deviations of a coordinate
+_LEVEL = FEW  # sine of the angle between normal and vertical below which a face has no level direction
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def outline_polygon(flat: Array, sigma: float, *, keep_order: bool = False) -> O
         if fewer than three corners are left, they enclose nothing, or the order cannot be known
     """
     points: list[Point] = [(x, y) for x, y in flat.tolist()]
-    nearest = max(_NEAREST, _NOISE * sigma)
+    nearest = max(LEAST, _NOISE * sigma)
     order, merged = _distinct(points, nearest)
     if len(order) < 3:
         raise GeometryError(

@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import PARALLEL
 
-_NOWHERE = np.full(3, math.nan)
-_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt beyond which a plane is refused
+_LARGEST_TILT = PARALLEL  # standard deviation of a tilt beyond which a plane is refused
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def fit_plane(points: ArrayLike, sigma: ArrayLike | None, observer: ArrayLike | 
     from survey.faces._kernels.robust_fit import FINE, fit_face  # numba: readers of fits do without it
 
     xyz, deviations = _checked(points, sigma)
-    towards = _NOWHERE if observer is None else np.ascontiguousarray(observer, dtype=np.float64)
+    towards = np.full(3, math.nan) if observer is None else np.ascontiguousarray(observer, dtype=np.float64)
     status, frame, accepted, residuals, standardised, covariance, (offset, rms, sigma0) = fit_face(
         xyz, deviations, sigma is not None, towards
     )

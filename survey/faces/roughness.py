@@ -15,16 +15,14 @@ from ground.errors import GeometryError
 from ground.statistics.roots import root_of
 from ground.statistics.scale import spread
 from survey.arrays import Array
+from survey.conventions import MANY, SIGNIFICANT, TENTH
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord
 
-SIGNIFICANT = 3.0
-"""Standard deviations beyond which a scatter differs from the stated one not by chance."""
-
-TOLERANCE = 0.1
+TOLERANCE = TENTH
 """Relative error below which a stated standard deviation is right, since nobody states it better."""
 
-_MIN_FREEDOM = 30  # degrees of freedom from which a scatter is known to a fifth
+_MIN_FREEDOM = MANY  # degrees of freedom from which a scatter is known to a fifth
 _CLIPPED = 1.4  # standard deviation of a clipped scatter over that of all of n normal values
 _CURVED = 9  # least points of a face from which its curvature is told from its roughness: 6 unknowns
 

@@ -6,9 +6,10 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import fdtri
+from scipy.special import chdtri, fdtri
 
 from survey.arrays import Array, Bools
+from survey.conventions import FEW, ODDS, RARE, STEEPEST, VANISHING
 from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces.planes import FaceFit
 
@@ -74,21 +75,22 @@ def likely_ratio(redundancy: int, quantile: float) -> float:
     return (1.0 - spread + quantile * math.sqrt(spread)) ** 3
 
 
-_CURVED = 16.27  # chi-square of the 3 parameters of a quadric at 0.1 %
-_CURVED_WITHOUT = 7.81  # the same at 5 %: must remain without any one point
+_CURVED = float(chdtri(3, RARE))  # chi-square of the 3 parameters of a quadric at 0.1 %
+_CURVED_WITHOUT = float(chdtri(3, FEW))  # the same at 5 %: must remain without any one point
 _CURVED_BEYOND_TWO = 22.0  # truncated squares of two outliers that a quadric can be bent through
-_STRIP = 24.4  # squares that a strip along an edge must explain: 2 parameters
-_SECOND_PLANE = 26.9  # squares that a second plane must explain: 3 parameters at 0.1 %, 200 lines tried
-_SEARCH = 10.6  # share of these that the search of the line accounts for: 2 ln 200
-_WIDER = 5.0  # advantage in likelihood that wider scatter needs as an explanation
-_EXACT = 1e-13  # scatter over size that is rounding
-_STEEPEST = math.radians(60.0)  # a second plane turned farther is another side of the stone, or outliers
+_SEARCH = 10.6  # squares that the search of the line accounts for: 2 ln 200
+_STRIP = float(chdtri(2, RARE)) + _SEARCH  # squares that a strip along an edge must explain: 2 parameters
+_SECOND_PLANE = (
+    _CURVED + _SEARCH
+)  # squares that a second plane must explain: 3 parameters at 0.1 %, 200 lines tried
+_WIDER = ODDS  # advantage in likelihood that wider scatter needs as an explanation
+_STEEPEST = STEEPEST  # a second plane turned farther is another side of the stone, or outliers
 _SCATTERED = 1.0 / 3.0  # share of points off the plane beyond which they are not isolated
 
 
 def explain_heights(fit: FaceFit, points: ArrayLike, sigma: ArrayLike | None) -> FaceShape:
     """Judge the shape of a face whose residuals exceed chance; arguments as of `judge_shape`."""
-    if not fit.sigma0 > _EXACT * fit.singular_values[0]:
+    if not fit.sigma0 > VANISHING * fit.singular_values[0]:
         return FaceShape(ShapeKind.PLANE, f"plane: {len(fit.residuals) - len(fit.rejected)} points, exactly")
     scene = _heights(fit, points, sigma)
     verdicts = [verdict for verdict in (_curved(scene), _bevelled(scene)) if verdict is not None]

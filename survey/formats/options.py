@@ -7,6 +7,9 @@ from pathlib import Path
 from ground.errors import UsageError
 from survey.records.survey import BlockRecord, Reject, Survey, SurveyHead, SurveyStream
 
+SIGMA = 0.003
+"""Standard deviation of a measured point, where nothing states it [m]."""
+
 
 @dataclass(frozen=True)
 class ReadingOptions:
@@ -37,7 +40,7 @@ class ReadingOptions:
 
     codes: str | None = None
     kind: str = "ashlar"
-    sigma: float = 0.003
+    sigma: float = SIGMA
     head: SurveyHead | None = None
     unit: float | None = None
     columns: str | None = None

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import STEP
 from survey.geometry._kernels.adjacency import GROUPS, face_planes, touching_faces
 from survey.geometry._kernels.between import hidden, thinnest_of
 from survey.geometry._kernels.boxes import count_near, list_near, morton_codes
@@ -112,7 +113,7 @@ def find_touching(
     width: float = 0.04,
     angle: float = 12.0,
     *,
-    overlap: float = 0.02,
+    overlap: float = STEP,
     share: float = 0.03,
     among: Bools | None = None,
 ) -> Touching:

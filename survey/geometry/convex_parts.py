@@ -21,6 +21,7 @@ from scipy.optimize import linprog
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import SAME
 from survey.geometry.convexity import ReflexEdge, flatness, is_convex, reflex_edges
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, planes_of_solid, volume_of
@@ -29,7 +30,6 @@ from survey.geometry.watertight import triangulate
 Place = tuple[float, float, float]
 Plane = tuple[float, float, float, float]
 
-_SAME_VOLUME = 1e-6  # of the stone's volume: largest difference of its parts', if its faces are planes
 _BEGINNINGS = 8  # first cuts that are followed to the end
 
 
@@ -259,7 +259,7 @@ class _Cutter:
 
     def _is_filled(self, parts: Sequence[Solid]) -> bool:
         whole = volume_of(self._local)
-        return abs(sum(map(volume_of, parts)) - whole) <= _SAME_VOLUME * whole
+        return abs(sum(map(volume_of, parts)) - whole) <= SAME * whole
 
 
 def _farthest_behind(planes: Array) -> Array | None:

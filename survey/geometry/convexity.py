@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from survey.conventions import VANISHING
 from survey.geometry.solids import Solid, highest_corner, planes_of_solid
 
-_FLAT = 1e-9  # of its size: height within which a corner lies on a plane and an edge is not reflex
 _WARPS = 4.0  # warps of two faces by which one may seem to stand in front of the other
 
 
@@ -35,7 +35,7 @@ def flatness(solid: Solid) -> float:
         float(np.abs(solid.vertices[list(face)] @ plane[:3] - plane[3]).max())
         for face, plane in zip(solid.faces, planes, strict=True)
     )
-    return _FLAT * float(np.linalg.norm(np.ptp(solid.vertices, axis=0))) + _WARPS * warp
+    return VANISHING * float(np.linalg.norm(np.ptp(solid.vertices, axis=0))) + _WARPS * warp
 
 
 def is_convex(solid: Solid, tolerance: float | None = None) -> bool:

@@ -7,15 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
-from survey.geometry._kernels.cutting import FULL, CutSolid, cut_out
+from survey.conventions import ROUNDING, THINNEST, TOUCHING
+from survey.geometry._kernels.cutting import FULL, MAX_CORNERS, CutSolid, cut_out
 from survey.geometry.solids import Solid, area_vector
 
 Faces = tuple[tuple[int, ...], ...]
-
-_ON_PLANE_DISTANCE = 1e-10  # metres: distance within which a corner lies on a plane
-_CLEAR = 1e-6  # metres: least depth of a corner below all other planes for the faces to stay as they were
-_THIN = 1e-5  # metres: thickness below which a face of the intersection is due to rounding
-_MAX_FACE_CORNERS = 64
 
 
 @dataclass(frozen=True)
@@ -135,7 +131,7 @@ def _moved(faces: Faces, planes: Array) -> tuple[Array, Bools]:
     height = np.einsum("nfk,nvk->nvf", planes[:, :, :3], corners) - planes[:, None, :, 3]
     incidence = np.zeros((len(meeting), len(faces)), np.bool_)
     incidence[np.arange(len(meeting))[:, None], meeting] = True
-    below = np.where(incidence, -np.inf, height).max(axis=(1, 2)) < -_CLEAR
+    below = np.where(incidence, -np.inf, height).max(axis=(1, 2)) < -TOUCHING
     return corners, below & wide.all(axis=1)
 
 
@@ -184,7 +180,7 @@ def _cut(solid: Solid, planes: Array) -> CutStone | None:
 def _is_thin(polygon: Array) -> bool:
     edges = np.roll(polygon, -1, axis=0) - polygon
     area = 0.5 * float(np.linalg.norm(np.cross(polygon - polygon[0], edges).sum(axis=0)))
-    return area < _THIN * float(np.linalg.norm(edges, axis=1).max())
+    return area < THINNEST * float(np.linalg.norm(edges, axis=1).max())
 
 
 def _intersect(planes: Array, centre: Array, reach: float, code: str) -> CutStone | None:
@@ -192,10 +188,10 @@ def _intersect(planes: Array, centre: Array, reach: float, code: str) -> CutSton
     local[:, 3] -= planes[:, :3] @ centre
     room = len(planes) + 6
     vertices = np.empty((16 * room, 3))
-    loops, sizes = np.empty((room + 1, _MAX_FACE_CORNERS), np.int64), np.empty(room + 1, np.int64)
+    loops, sizes = np.empty((room + 1, MAX_CORNERS), np.int64), np.empty(room + 1, np.int64)
     of_face, meeting = np.empty(room + 1, np.int64), np.empty((16 * room, 3), np.int64)
     status, corners, faces = cut_out(
-        local, np.zeros(3), reach, _ON_PLANE_DISTANCE, CutSolid(vertices, loops, sizes, of_face, meeting)
+        local, np.zeros(3), reach, ROUNDING, CutSolid(vertices, loops, sizes, of_face, meeting)
     )
     if status != FULL:
         return None

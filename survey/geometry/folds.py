@@ -10,11 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import SAME
 from survey.geometry.solids import area_vector
 
 Polygon = tuple[int, ...]
-
-_ALIKE = 1e-6  # of a polygon's size: difference below which warps are equal
 
 
 def warp(corners: Array) -> float:
@@ -49,7 +48,7 @@ def fold(vertices: Array, polygon: Polygon, tolerance: float) -> list[Polygon]:
         warped = max(warp(vertices[list(half)]) for half in halves)
         across = float(np.linalg.norm(vertices[halves[0][0]] - vertices[halves[0][-1]]))
         candidate = (
-            _ALIKE * size * round(warped / (_ALIKE * size)) if np.isfinite(warped) else warped,
+            SAME * size * round(warped / (SAME * size)) if np.isfinite(warped) else warped,
             across,
         )
         if candidate < score:

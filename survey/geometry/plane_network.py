@@ -21,11 +21,7 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
 from survey.arrays import Array, Ints
-
-_STEPS = 30
-_POLISH = 4
-_DONE = 1e-14  # of the size of all: smaller steps are rounding
-_SOFT = 1e-9  # δ and μ [-]
+from survey.conventions import EPSILON, MAX_ITERATIONS, ROUNDS, VANISHING
 
 
 @dataclass(frozen=True)
@@ -55,12 +51,12 @@ def settle(vertices: Array, corner: Ints, plane: Ints) -> Settled:
     centre = vertices.mean(axis=0)
     network = _Network(vertices - centre, corner, plane)
     size = float(np.abs(network.x).max())
-    for _ in range(_STEPS):
-        if network.step() <= _DONE * size:
+    for _ in range(MAX_ITERATIONS):
+        if network.step() <= EPSILON * size:
             break
-    for _ in range(_POLISH):
+    for _ in range(ROUNDS):
         network.start = network.x.copy()
-        if network.step() <= _DONE * size:
+        if network.step() <= EPSILON * size:
             break
     return Settled(network.x + centre, network.normal, network.distances())
 
@@ -116,7 +112,7 @@ class _Network:
             [3 * self._corner[:, None] + np.arange(3), 3 * (nv + self._plane[:, None]) + np.arange(3)]
         )
         rows = 3 * (nv + count) + np.repeat(np.arange(ni), 6)
-        diagonal = np.repeat([1.0, _SOFT, -_SOFT], [3 * nv, 3 * count, ni])
+        diagonal = np.repeat([1.0, VANISHING, -VANISHING], [3 * nv, 3 * count, ni])
         every = np.arange(len(diagonal))
         flat = columns.ravel()
         matrix = coo_array(

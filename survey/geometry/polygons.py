@@ -8,15 +8,15 @@ import numpy as np
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools
+from survey.conventions import CERTAIN, FEW, MOST, PARALLEL, SAMPLE, SOME, TENTH, WIDEST_JOINT
 
-_WIDEST = 0.05  # gap between two stones that is a joint [m]
-_PARALLEL = math.cos(math.radians(10.0))  # of the angle between the two sides of a joint
-_ALONG = 0.5  # of the shorter of two sides: their common length, at least
-_MIN_JOINTS = 8  # joints from which a usual one is known
-_NONE = 0.25  # of the usual joint: a gap below is none
-_SNAPPED = 0.1  # of the usual joint: distance of two corners that are one
-_RARE = 0.05  # part of all joints: more that touch are a habit
-_CLEAR = 4.0  # robust standard deviations by which it differs from the usual one
+_PARALLEL = math.cos(PARALLEL)  # of the angle between the two sides of a joint
+_ALONG = MOST  # of the shorter of two sides: their common length, at least
+_MIN_JOINTS = SAMPLE  # joints from which a usual one is known
+_NONE = SOME  # of the usual joint: a gap below is none
+_SNAPPED = TENTH  # of the usual joint: distance of two corners that are one
+_RARE = FEW  # part of all joints: more that touch are a habit
+_CLEAR = CERTAIN  # robust standard deviations by which it differs from the usual one
 
 
 class Seamless(NamedTuple):
@@ -73,7 +73,7 @@ def _gap(first: Array, second: Array) -> tuple[float, float] | None:
         common = min(float(along.max()), float(lengths[0][a])) - max(float(along.min()), 0.0)
         width = float(across.mean())
         enough = common >= _ALONG * min(lengths[0][a], lengths[1][b])
-        if enough and abs(width) <= _WIDEST and (best is None or common > best[0]):
+        if enough and abs(width) <= WIDEST_JOINT and (best is None or common > best[0]):
             apart = ends[::-1] - np.array([np.zeros(2), runs[0][a]])
             best = common, width, float(np.linalg.norm(apart, axis=1).max())
     return None if best is None else best[1:]

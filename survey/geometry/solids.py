@@ -5,9 +5,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from survey.arrays import Array, Ints
+from survey.arrays import AXES, Array, Ints
 
-BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+def _sides_of_box(axis: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the corners of the lower and the upper side of a box across an axis."""
+    across, second, third = (1 << (2 - (axis + k) % 3) for k in range(3))
+    lower = (0, third, third + second, second)
+    return lower, tuple(across + corner for corner in (lower[0], *lower[:0:-1]))
+
+
+BOX = tuple(side for axis in range(AXES) for side in _sides_of_box(axis))
 """Faces of a box whose corner k is at bits k₂ k₁ k₀ of its three axes; outward if the axes are right-handed."""
 
 

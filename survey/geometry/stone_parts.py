@@ -1,16 +1,18 @@
 """Convex parts of any stone, measured or infill."""
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import permutations
 
 import numpy as np
 
 from survey.arrays import Array, Bools
+from survey.conventions import ALIKE, MANY, ON_PLANE, ROWS, SAME
 from survey.geometry.convex_parts import convex_parts
 from survey.geometry.solids import BOX, Solid, area_vector, volume_of
 from survey.geometry.watertight import triangulate
 
-_MANY = 40  # least number of faces of a solid that is tried as a storey of infill first
+_MANY = MANY  # least number of faces of a solid that is tried as a storey of infill first
 
 
 def stone_parts(solid: Solid) -> tuple[Solid, ...]:
@@ -30,10 +32,7 @@ def stone_parts(solid: Solid) -> tuple[Solid, ...]:
 
 Box = tuple[tuple[int, int], ...]
 
-_FAMILY = float(np.cos(np.radians(25.0)))  # cosine of 25°: planes nearer to parallel are of one family
-_COPLANAR = 1e-7  # metres: distance of corners from each other's planes within which faces are coplanar
-_VOLUME = 1e-6  # of a solid's volume: largest difference of its parts' volume
-_AT_ONCE = 2_000_000  # solid angles that are computed together, which bounds the memory
+_FAMILY = math.cos(ALIKE)  # planes nearer to parallel are of one family
 
 
 def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
@@ -57,7 +56,7 @@ def grid_parts(solid: Solid) -> tuple[Solid, ...] | None:
     best = min((_boxes(filled, order) for order in permutations(range(3))), key=len)
     parts = [_part(solid.code, nodes, box) for box in best]
     whole = volume_of(local)
-    if abs(sum(volume_of(piece) for piece in parts) - whole) > _VOLUME * whole:
+    if abs(sum(volume_of(piece) for piece in parts) - whole) > SAME * whole:
         return None
     return tuple(Solid(piece.code, piece.vertices + origin, piece.faces) for piece in parts)
 
@@ -74,7 +73,7 @@ def _families(solid: Solid) -> list[Array] | None:
             groups.append(group := [])
         elif group[0][:3] @ plane[:3] < 0.0:
             plane = -plane
-        if not any(np.abs(polygon @ plane[:3] - plane[3]).max() < _COPLANAR for plane in group):
+        if not any(np.abs(polygon @ plane[:3] - plane[3]).max() < ON_PLANE for plane in group):
             group.append(plane)
     if len(groups) != 3:
         return None
@@ -110,8 +109,8 @@ def _inside(solid: Solid, nodes: Array) -> Bools:
     middles = np.mean(corners, axis=0, dtype=np.float64).reshape(-1, 3)
     triangles = solid.vertices[triangulate(solid)]
     inside = [
-        _angles(middles[start : start + _AT_ONCE // len(triangles)], triangles) > 2.0 * np.pi
-        for start in range(0, len(middles), _AT_ONCE // len(triangles))
+        _angles(middles[start : start + ROWS // len(triangles)], triangles) > 2.0 * np.pi
+        for start in range(0, len(middles), ROWS // len(triangles))
     ]
     return np.concatenate(inside).reshape(shape)
 

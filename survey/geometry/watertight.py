@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import ON_PLANE, VANISHING
 from survey.geometry.solids import (
     Solid,
     area_vector,
@@ -16,9 +17,6 @@ from survey.geometry.solids import (
     volume_of,
     volumes_alike,
 )
-
-_CONVEX_TOLERANCE = 1e-9  # metres: height of a corner in front of a face plane
-_ON_A_SIDE = 1e-12  # of a triangle's size: distance within which a corner is on its side
 
 
 def check_watertight(solid: Solid, *, convex: bool = False) -> None:
@@ -49,7 +47,7 @@ def check_watertight(solid: Solid, *, convex: bool = False) -> None:
             )
     if not (volume := volume_of(solid)) > 0.0:
         raise GeometryError(f"its volume is {volume:.3g} m³: inside out or flat", where=where, remedy=remedy)
-    tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(solid.vertices).max())
+    tolerance = ON_PLANE + 4.0 * np.spacing(np.abs(solid.vertices).max())
     if convex and (height := highest_corner(solid)) > tolerance:
         raise GeometryError(f"it is not convex: a corner is {height:.3g} m out", where=where, remedy=remedy)
 
@@ -72,7 +70,7 @@ def doubtful_solids(solids: Sequence[Solid], convex: Sequence[bool]) -> list[int
         with np.errstate(invalid="ignore"):
             sound &= volumes_alike(vertices, faces) > 0.0
             if also:
-                tolerance = _CONVEX_TOLERANCE + 4.0 * np.spacing(np.abs(vertices).max(axis=(1, 2)))
+                tolerance = ON_PLANE + 4.0 * np.spacing(np.abs(vertices).max(axis=(1, 2)))
                 sound &= highest_corners(vertices, faces) <= tolerance
         doubtful += rows[~sound].tolist()
     return sorted(doubtful)
@@ -122,6 +120,6 @@ def _is_ear(vertices: Array, rest: list[int], k: int, normal: Array) -> bool:
         return False
     others = vertices[[i for i in rest if i not in ids]]
     # a corner on the side to be cut is in the way, also where rounding puts it just outside
-    slack = _ON_A_SIDE * np.linalg.norm(inward, axis=1) * float(np.abs(corners - corners[0]).max())
+    slack = VANISHING * np.linalg.norm(inward, axis=1) * float(np.abs(corners - corners[0]).max())
     inside = ((others[:, None, :] - corners) * inward).sum(axis=2) >= -slack
     return not inside.all(axis=1).any()

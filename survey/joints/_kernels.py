@@ -7,37 +7,33 @@ import numpy as np
 from numba import njit
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import CHECKED, FINEST, GROUP, LEVEL, MAX_ITERATIONS, PER_CENT, SAMPLE, SOME, WEAR
 from survey.geometry._kernels.vectors import dot, height_over
 
-_ROUNDS = 30
 _HUBER = 1.5
 """Robust standard deviations beyond which residuals lose weight."""
 
-_PLANE = 0.25
+_PLANE = SOME
 """Of the straightness: largest rms of the corners of a wedge-shaped joint about its two planes."""
 
-_SHARP = 1e-4
-"""Metres: residual below which the weight no longer grows when the sum of residuals is minimised."""
 
-_MANY = 12
+_MANY = SAMPLE
 """Least number of sound corners of a joint of more than two stones."""
 
-_WORN = 0.01
+WORN = PER_CENT
 """Weight of a worn corner: it is some 25 mm off where a sound one is 2.5 mm off."""
 
-_WEAR = 0.025
-"""Metres: residual of a worn corner beyond which it loses weight, since no wear explains a corner 25 cm off."""
 
-_USUAL = 0.25
+_USUAL = SOME
 """Weight of the usual width of joints, used where fewer than `KNOWN` sound corners define one side."""
 
-KNOWN = 3
+KNOWN = GROUP
 """Least number of sound corners of each side of a joint that determine its width without the usual one."""
 
-_OWN = 4
+_OWN = CHECKED
 """Least number of sound corners from which one side has its own plane."""
 
-_WEDGE = 0.035
+_WEDGE = LEVEL
 """Least opening of a joint, as a slope, for which the two sides may have planes of their own (2°)."""
 
 
@@ -127,7 +123,7 @@ def _fit(points, hands, sound, scale, usual, straightness, plane, value):
     plane[0], plane[1], plane[2] = solution[0], solution[1] / scale, solution[2] / scale
     total, weight = 0.0, 0.0
     for i in range(k):
-        w, residual = 1.0 if sound[i] else _WORN, abs(points[i, 2] - _value(design[i], solution))
+        w, residual = 1.0 if sound[i] else WORN, abs(points[i, 2] - _value(design[i], solution))
         total, weight = total + w * residual**2, weight + w
         if sound[i] and residual <= straightness:
             value[4] = max(value[4], residual)
@@ -156,11 +152,11 @@ def _least_sum(design, heights, sound):
     solution, weights = np.zeros(6), np.empty(k)
     for i in range(k):
         weights[i] = 1.0 if sound[i] else 0.0
-    for _ in range(10 * _ROUNDS):
+    for _ in range(10 * MAX_ITERATIONS):
         _solve(*_normal(design, heights, weights, np.int64(4)), solution)
         for i in range(k):
             if sound[i]:
-                weights[i] = 1.0 / max(abs(heights[i] - _value(design[i], solution)), _SHARP)
+                weights[i] = 1.0 / max(abs(heights[i] - _value(design[i], solution)), FINEST)
     return solution
 
 
@@ -214,7 +210,7 @@ def _huber(design, heights, sound, unknowns, prior, usual):
     k = design.shape[0]
     solution, previous, weights = np.zeros(6), np.zeros(6), np.empty(k)
     for i in range(k):
-        weights[i] = 1.0 if sound[i] else _WORN
+        weights[i] = 1.0 if sound[i] else WORN
     number = 0
     for i in range(k):
         number += sound[i]
@@ -222,7 +218,7 @@ def _huber(design, heights, sound, unknowns, prior, usual):
         # least squares alone would never identify an odd stone at the end of a bed
         _weigh(design, heights, sound, _least_sum(design, heights, sound), weights)
     left = 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         matrix, right = _normal(design, heights, weights, unknowns)
         matrix[3, 3] += prior
         right[3] += prior * usual
@@ -254,7 +250,7 @@ def _weigh(design, heights, sound, solution, weights):
     spread = 1e-4 if count == 0 else max(1.4826 * _median(residuals, count), 1e-4)
     for i in range(design.shape[0]):
         residual = abs(heights[i] - _value(design[i], solution))
-        weight, bend = (1.0, _HUBER * spread) if sound[i] else (_WORN, _WEAR)
+        weight, bend = (1.0, _HUBER * spread) if sound[i] else (WORN, WEAR)
         weights[i] = weight * min(1.0, bend / max(residual, 1e-300))
     return left
 

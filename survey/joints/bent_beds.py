@@ -13,17 +13,16 @@ from scipy.ndimage import median_filter
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import GROUP, MAX_ROUNDS, MOST, ROUNDS, SAMPLE, TENTH
 from survey.geometry.adjacency import SolidArrays
+from survey.joints._kernels import WORN
 from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.settings import JointSettings
 
-_FINE = 0.5  # of the straightness: distance from the chain that is preferred for corners
-_MAX_OFF_SHARE = 0.1  # largest part of the sound corners that may be off the chain
-_WORN = 0.01  # weight of a worn corner
-_MIN_LINKS = 3  # least number of links of a chain
-_MAX_CHAINS = 12  # largest number of chains of a bed
-_TURNS = 3  # largest number of iterations that classify a chain's valleys and ridges
-_MAX_ITERATIONS = 10
+_FINE = MOST  # of the straightness: distance from the chain that is preferred for corners
+_MAX_OFF_SHARE = TENTH  # largest part of the sound corners that may be off the chain
+_MIN_LINKS = GROUP  # least number of links of a chain
+_MAX_CHAINS = SAMPLE  # largest number of chains of a bed
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def fit_bent_bed(
     coarse: list[_Chain] = []
     for ends in _chains(bed.place, bed.height):
         slopes = _slopes(bed, ends)
-        for _ in range(_TURNS):
+        for _ in range(ROUNDS):
             number, knots = _changes(bed, ends, slopes, extents)
             posts = np.array([min(reach), *knots, max(reach)])
             if not (np.diff(posts) > 0.0).all():
@@ -226,17 +225,17 @@ def _fitted(solids: SolidArrays, sound: Bools, bed: _Bed, posts: Array, number: 
     corner, hand = np.concatenate(rows), np.concatenate(hands)
     local = (solids.vertices[corner] - bed.origin) @ bed.axes.T
     design = np.column_stack([_hats(local[:, 0], posts), local[:, 1], 0.5 * hand])
-    weight = np.where(sound[corner], 1.0, _WORN)
+    weight = np.where(sound[corner], 1.0, WORN)
     solution: Array = np.zeros(design.shape[1])
     residual: Array = np.zeros(len(corner))
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ROUNDS):
         root = np.sqrt(weight)
         fitted = np.linalg.lstsq(design * root[:, None], local[:, 2] * root, rcond=None)[0]
         solution = fitted.astype(np.float64)
         residual = np.abs(local[:, 2] - design @ solution)
         spread = max(deviation(residual, 0.0), 1e-4)
         robust = np.minimum(1.0, 1.5 * spread / np.maximum(residual, 1e-300))
-        weight = np.where(sound[corner], robust, _WORN)
+        weight = np.where(sound[corner], robust, WORN)
     return _Chain(posts, solution[:-2], float(solution[-2]), residual[sound[corner]], number)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import MAX_ROUNDS, SAME
 from survey.geometry._kernels.convexity import highest_corners
 from survey.geometry.adjacency import SolidArrays
 from survey.geometry.cutting import cut_stones, joins_three, moves
@@ -17,10 +18,6 @@ from survey.joints.settings import JointSettings
 from survey.joints.worn_sides import mended_planes
 from survey.simplify.simplify import BlockyStone
 
-_OPENING_ROUNDS = (
-    10  # rounds in which single joints are left open; then all joints of a stone that moves too far
-)
-_CONVEX = 1e-6  # of a stone's size: height of a corner above a face's plane that is due to rounding
 _CORE = "infill"  # kind of the parts of the core of a wall
 _INFERRED = ("rule", "kind", "structure")  # origins of a depth that nobody has measured on the stone itself
 _BOTH_KEPT = "both stones keep their shape"
@@ -97,7 +94,7 @@ def as_building(stones: Sequence[BlockyStone]) -> LocalStones:
     gathered = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(gathered)
     height, extent = highest_corners(*_arrays(gathered), planes.normals, planes.offsets)
-    convex: Bools = height <= _CONVEX * extent
+    convex: Bools = height <= SAME * extent
     sound = np.concatenate([_sound(stone) for stone in stones])
     notched = ~convex & np.array([joins_three(solid.faces) for solid in solids])
     core = np.array([stone.kind == _CORE for stone in stones])
@@ -122,7 +119,7 @@ def close_within_bounds(
     """
     notched = set(np.flatnonzero(building.notched).tolist())
     reasons, unmended = [""] * len(facing), set[int]()
-    for number in range(_OPENING_ROUNDS + len(building.stones)):
+    for number in range(MAX_ROUNDS + len(building.stones)):
         links = np.array([k for k, reason in enumerate(reasons) if not reason], np.int64)
         some = contact_planes(building.faces, some_links(facing, links), settings)
         for k in links[some.of_link < 0].tolist():
@@ -142,9 +139,7 @@ def close_within_bounds(
                 if free[i].all():
                     unmended.add(i)
                 else:
-                    _leave_open(
-                        building, facing, contact, i, moved, settings, reasons, number >= _OPENING_ROUNDS
-                    )
+                    _leave_open(building, facing, contact, i, moved, settings, reasons, number >= MAX_ROUNDS)
         if not offended:
             break
     return Cut(contact, reasons, solids, planes, free, of_face)

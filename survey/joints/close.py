@@ -16,6 +16,7 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array, Ints
+from survey.conventions import ROUNDS, TOUCHING
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.adjacency import SolidArrays
 from survey.geometry.solids import Solid, planes_of_solid
@@ -31,8 +32,6 @@ from survey.joints.settings import JointMode, JointSettings
 from survey.simplify.result import BlockShape
 from survey.simplify.simplify import BlockyStone, simplify
 
-_ROUNDS = 4  # rounds in which closing joints reveals further ones, beside worn corners
-_MEETS = 1e-6  # metres: distance within which faces share a plane
 _AS_SURVEYED = "joints are left as surveyed"
 _GROWN = "grows from its outline as surveyed"
 
@@ -209,7 +208,7 @@ def _met(
     """Yield the joints between stones of a leaf and stones that are none of it, where they meet."""
     arrays = SolidArrays.gather((solid.vertices, solid.faces) for solid in solids)
     planes = planes_of(arrays)
-    close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
+    close = replace(settings, max_width=TOUCHING, max_angle=0.01, min_overlap=0.0)
     facing = find_facing(arrays, planes, close)
     number = sum(len(one.joints) for one in grown)
     for k, (i, j) in enumerate(planes.owner[facing.faces].tolist()):
@@ -226,7 +225,7 @@ def _met(
 def _closed(building: LocalStones, facing: FacingFaces, settings: JointSettings) -> tuple[Cut, FacingFaces]:
     """Close all joints that can be closed, including those revealed by closing others."""
     cut = close_within_bounds(building, facing, settings, building.solids)
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         before, facing = facing, newly_facing(building, facing, cut, settings)
         cut = close_within_bounds(building, facing, settings, cut.solids)
         if len(facing) == len(before):
@@ -250,7 +249,7 @@ def _as_surveyed(building: LocalStones, facing: FacingFaces) -> Cut:
     first, second = building.planes[facing.faces[:, 0]], building.planes[facing.faces[:, 1]]
     size = np.sqrt(building.faces.planes.areas[facing.faces].max(axis=1))
     turned = np.linalg.norm(first[:, :3] + second[:, :3], axis=1) * size
-    shared = (np.abs(facing.gap) <= _MEETS) & (turned <= _MEETS)
+    shared = (np.abs(facing.gap) <= TOUCHING) & (turned <= TOUCHING)
     of_link = np.where(shared, np.arange(len(facing)), -1)
     contact = ContactPlanes(first[:, :3], first[:, 3], of_link, np.ones(len(facing), np.int64))
     reasons = ["" if one else _AS_SURVEYED for one in shared.tolist()]

@@ -8,6 +8,7 @@ few stones that are off are moved to the plane of the others; if they are not fe
 plane.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,6 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import MOST, ON_PLANE, PARALLEL, SOME
 from survey.geometry.adjacency import SolidArrays
 from survey.joints._kernels import KNOWN, FaceCorners, continuing_faces, fit_middle_planes
 from survey.joints.bent_beds import fit_bent_bed
@@ -23,10 +25,9 @@ from survey.joints.facing import FacePlanes, FacingFaces
 from survey.joints.hidden_sides import HiddenSides, common_planes
 from survey.joints.settings import JointSettings
 
-_ALIKE = 0.985  # cosine of 10°: largest angle between faces of neighbours that continue each other
-_MAX_OFF_SHARE = 0.25  # largest part of the corners of a joint that may be off it
-_FINE = 0.5  # of the straightness: distance within which the inliers of a straight bed lie
-_SAME_PLANE = 1e-8  # metres: distance within which a face that must stay lies in a plane
+_ALIKE = math.cos(PARALLEL)  # largest angle between faces of neighbours that continue each other
+_MAX_OFF_SHARE = SOME  # largest part of the corners of a joint that may be off it
+_FINE = MOST  # of the straightness: distance within which the inliers of a straight bed lie
 
 
 @dataclass(frozen=True)
@@ -266,7 +267,7 @@ class _Found:
         """Return whether a face also lies in another plane, within rounding."""
         corners = self.faces.solids.vertices[self.faces.corners(face)]
         alike = float(plane[:3] @ second[:3]) > 0.0
-        return alike and bool(np.abs(corners @ second[:3] - second[3]).max() <= _SAME_PLANE)
+        return alike and bool(np.abs(corners @ second[:3] - second[3]).max() <= ON_PLANE)
 
     def planes(self) -> ContactPlanes:
         """Return all planes found, with the side of each on which the first face of each pair lies."""

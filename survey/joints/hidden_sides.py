@@ -12,9 +12,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import MAX_ROUNDS
 
 # rounds in which the members of a plane and the plane itself are found from each other, at most
-_MAX_PLANE_ITERATIONS = 10
 
 
 class HiddenSides(NamedTuple):
@@ -66,7 +66,7 @@ def _grown(sides: HiddenSides, graph: "coo_array[np.float64]", seed: int, free: 
     """Return the plane that begins with a side, and its members among the sides that have none yet."""
     alone = sides.planes[seed], np.array([seed])
     plane, members = alone
-    for _ in range(_MAX_PLANE_ITERATIONS):
+    for _ in range(MAX_ROUNDS):
         on_plane = free & (_off(sides, plane) <= sides.slack)
         on_plane[seed] = True
         grown = _linked(graph, on_plane, seed)

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array, Bools
+from survey.conventions import JOINT, ON_PLANE, ROUNDING, SOME
 from survey.geometry._kernels.convexity import deepest_overlaps
 from survey.geometry.adjacency import boxes_of, near_pairs
 from survey.geometry.cutting import common_part, cut_stones, moves
 from survey.geometry.solids import Solid, volume_of
 
-_DEPTH_ROUNDING = 1e-10  # metres: depth of overlap of solids that share a plane that is due to rounding
-_ON_PLANE = 1e-8  # metres: distance within which a corner lies on a plane
-_LEAST_VOLUME = 1e-12  # cubic metres: smallest overlap
-_ALIKE = 0.3  # difference of unit normals below which two faces have no plane between them
-_SHALLOW = 0.01  # metres: depth up to which a free face moves back, so that the stone gets no further face
+LEAST_VOLUME = 1e-12  # cubic metres: smallest overlap
+_ALIKE = SOME  # difference of unit normals below which two faces have no plane between them
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,8 @@ def find_overlaps(solids: Sequence[Solid], planes: Mapping[int, Array]) -> list[
     all_vertices, all_planes = np.concatenate(vertices), np.concatenate(rows)
     out = []
     for pair in near_pairs(boxes_of(boxes, starts, 0.0), np.ones(len(chosen), np.bool_)):
-        depth = deepest_overlaps(pair, all_vertices, vertex_starts, all_planes, plane_starts, _DEPTH_ROUNDING)
-        for k in np.flatnonzero(depth > _DEPTH_ROUNDING):
+        depth = deepest_overlaps(pair, all_vertices, vertex_starts, all_planes, plane_starts, ROUNDING)
+        for k in np.flatnonzero(depth > ROUNDING):
             i, j = sorted((chosen[pair[k, 0]], chosen[pair[k, 1]]))
             if solids[i].code == solids[j].code:
                 continue
@@ -72,7 +70,7 @@ def _overlapping(
     """Return the intersection of two solids; None if it is empty within rounding."""
     low, high = first.vertices.min(axis=0), first.vertices.max(axis=0)
     part = common_part(planes[i], planes[j], 0.5 * (low + high), 2.0 * float((high - low).max()))
-    if part is None or (volume := volume_of(part)) <= _LEAST_VOLUME:
+    if part is None or (volume := volume_of(part)) <= LEAST_VOLUME:
         return None
     return Overlapping((i, j), (first.code, second.code), part, volume, depth)
 
@@ -95,7 +93,7 @@ class _Parting:
             return
         ways = [*self._retreats(i, j, current), *self._retreats(j, i, current)]
         for _, stone, plane, row in sorted(
-            (retreat for retreat in ways if retreat[0] <= _SHALLOW), key=lambda way: way[:3]
+            (retreat for retreat in ways if retreat[0] <= JOINT), key=lambda way: way[:3]
         ):
             new = self.planes[stone].copy()
             new[plane] = row
@@ -201,7 +199,7 @@ def _face_on(solid: Solid, plane: Array) -> Array:
     """Return the corners (n, 3) of the face of a solid on a plane; empty if there is no such face."""
     for face in solid.faces:
         polygon = solid.vertices[list(face)]
-        if np.abs(polygon @ plane[:3] - plane[3]).max() <= _ON_PLANE:
+        if np.abs(polygon @ plane[:3] - plane[3]).max() <= ON_PLANE:
             return polygon
     return np.zeros((0, 3))
 
@@ -217,7 +215,7 @@ def _turns(plane: Array, polygon: Array, part: Array) -> list[tuple[float, Array
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         normals *= np.where(normals @ plane[:3] < 0.0, -1.0, 1.0)[:, None]
         for normal in normals:
-            if ((part - start) @ normal).min() >= -_DEPTH_ROUNDING:
+            if ((part - start) @ normal).min() >= -ROUNDING:
                 far = float(((polygon - start) @ normal).max())
                 out.append((far, np.array([*normal, float(start @ normal)])))
                 break

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import MOST, TOUCHING
 from survey.geometry.adjacency import SolidArrays
 from survey.geometry.cutting import moves
 from survey.joints.bounded_closing import Cut, LocalStones
@@ -113,9 +114,8 @@ class ClosingReport:
 # area, centroid and normal of faces in contact, by the pair of stones
 _Contacts = dict[tuple[int, int], list[tuple[float, Array, Array]]]
 
-_MEETS = 1e-6  # metres: distance within which faces of two stones are in contact
 _SAME_WAY = 0.999  # cosine of the largest angle between contacts of one joint
-_MOST_LOST = 0.5  # of the area of facing faces: a larger part without contact is reported as a gap
+_MOST_LOST = MOST  # of the area of facing faces: a larger part without contact is reported as a gap
 _BENT = "the bed is bent or stepped here, and stones stay convex"
 
 
@@ -245,7 +245,7 @@ def _width(building: LocalStones, facing: FacingFaces, cut: Cut, link: int) -> f
 
 def _contacts(solids: SolidArrays, planes: FacePlanes, settings: JointSettings) -> _Contacts:
     """Return all current contacts of faces."""
-    close = replace(settings, max_width=_MEETS, max_angle=0.01, min_overlap=0.0)
+    close = replace(settings, max_width=TOUCHING, max_angle=0.01, min_overlap=0.0)
     facing = find_facing(solids, planes, close)
     out = defaultdict(list)
     for k, (i, j) in enumerate(planes.owner[facing.faces].tolist()):

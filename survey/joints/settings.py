@@ -1,10 +1,12 @@
 """Settings of joint closing: criteria of a joint between two surveyed stones, and its treatment."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated
 
 from ground.settings import Setting
+from survey.conventions import ALIKE, JOINT, WIDEST_JOINT
 
 
 class JointMode(StrEnum):
@@ -40,13 +42,13 @@ class JointSettings:
             "m",
             above=0,
         ),
-    ] = 0.05
+    ] = WIDEST_JOINT
     max_angle: Annotated[
         float, Setting("Faces that open wider do not make a joint.", "°", above=0, below=45)
-    ] = 20.0
+    ] = math.degrees(ALIKE)
     min_overlap: Annotated[
         float, Setting("Narrowest strip in which two faces must face each other.", "m", at_least=0)
-    ] = 0.01
+    ] = JOINT
     straightness: Annotated[
         float,
         Setting(

@@ -6,16 +6,17 @@ an arch; if there is none, neighbours that continue the side define its plane; a
 the opposite side if it is nearly so.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import PARALLEL, WEAR
 from survey.geometry.solids import Solid
 from survey.joints.contact_planes import StoneFaces
 
-_ALIKE = 0.985  # cosine of 10°: largest angle between sides that continue each other or are parallel
-_CORNER_DISTANCE = 0.03  # metres: distance of a neighbour's corner from a side that it continues
+_ALIKE = math.cos(PARALLEL)  # largest angle between sides that continue each other or are parallel
 
 
 def mended_planes(
@@ -66,7 +67,7 @@ def _continuing(faces: StoneFaces, rows: Array, free: Bools, face: int, beside: 
     for stone in beside:
         for candidate in range(int(starts[stone]), int(starts[stone + 1])):
             alike = free[candidate] and rows[candidate, :3] @ rows[face, :3] > _ALIKE
-            if alike and np.abs(sound @ rows[candidate, :3] - rows[candidate, 3]).max() <= _CORNER_DISTANCE:
+            if alike and np.abs(sound @ rows[candidate, :3] - rows[candidate, 3]).max() <= WEAR:
                 points.append(_sound(faces, candidate))
     return np.concatenate(points)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
+from survey.conventions import LISTED
 
 INTERIOR = ("c", "xp", "yp", "as", "sk", "K1", "K2", "K3", "P1", "P2")
 """Parameters of the interior orientation, in the order of the kernels."""
@@ -179,7 +180,7 @@ class Network:
         return self.cameras[self.photos[photo].camera]
 
 
-def listed(words: Sequence[str], most: int = 6) -> str:
+def listed(words: Sequence[str], most: int = LISTED) -> str:
     """List names, the first of them if they are many."""
     more = len(words) - most
     return ", ".join(words[:most]) + (f" and {more} more" if more > 0 else "")

@@ -3,10 +3,10 @@
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import MAX_ITERATIONS
 from survey.orientation.network import Camera
 
-_MAX_ITERATIONS = 50  # iterations of the inverse of the distortion
-_CLOSE = 1e-13  # its precision, relative to the camera constant
+_CLOSE = 1e-13  # precision of the inverse of the distortion, relative to the camera constant
 
 
 def brown(places: Array, inner: Array) -> Array:
@@ -29,7 +29,7 @@ def _undo(places: Array, inner: Array) -> Array:
     Where the polynomials have no inverse, far outside the photograph, the places are nan.
     """
     out = places.copy()
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         with np.errstate(over="ignore", invalid="ignore"):
             off = places - brown(out, inner)
             out = out + off

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from ground.statistics.roots import root_of
 from ground.statistics.scale import spread
 from survey.arrays import Array
+from survey.conventions import ENOUGH
 
 Rows = NDArray[np.intp]
 
-_FREEDOM = 5  # least number of differences between corners of one stone from which κ is estimated
+_FREEDOM = ENOUGH  # least number of differences between corners of one stone from which κ is estimated
 
 
 @dataclass(frozen=True)

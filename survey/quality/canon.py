@@ -8,13 +8,9 @@ import numpy as np
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array
+from survey.conventions import ENOUGH, TOUCHING
 from survey.quality.precision import StoneQuality
 from survey.records.survey import Canon
-
-ENOUGH = 5
-"""Least number of stones of a kind for a median and its scatter."""
-
-_EXACT = 1e-6  # metres: lower limit of the standard deviation of a dimension
 
 
 @dataclass(frozen=True)
@@ -111,7 +107,7 @@ def _precision(stone: StoneQuality) -> float:
 
 
 def _score(deviation: float, precision: float, scatter: float) -> float:
-    return deviation / max(math.hypot(precision, scatter), _EXACT)
+    return deviation / max(math.hypot(precision, scatter), TOUCHING)
 
 
 def _median(kind: str, stones: Sequence[StoneQuality]) -> KindStandard:

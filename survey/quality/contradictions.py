@@ -25,18 +25,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import BESIDE, GROUP, SIGNIFICANT, SLOPED
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import SideConvergence, sloped_side, wedges
 
-SIGNIFICANT = 3.0
-"""Standard deviations of the measurement beyond which a stone contradicts its kind."""
-
-_BESIDE = 4  # stretchers of its course next to a header with which it is compared, fewer at the ends
-_MIN_STONES = 3  # least number of stones for a median of the survey
-_MEDIAN = 1.2533  # standard deviation of a median over that of a mean, of a normal distribution [-]
+_MIN_STONES = GROUP  # least number of stones for a median of the survey
+_MEDIAN = math.sqrt(
+    0.5 * math.pi
+)  # standard deviation of a median over that of a mean, of a normal distribution [-]
 _PARALLEL = math.radians(1.0)  # least convergence of a wedge: an arch of 1 m would have more than 180 stones
-_SLOPED = math.radians(5.0)  # least slope of a springing; sides of ashlars are plumb or level to a degree
 
 
 @dataclass(frozen=True)
@@ -154,7 +152,7 @@ def _no_slope(_: int, stone: StoneQuality, __: _Around) -> _Finding | None:
     if overhang > slope:
         slope, sigma = overhang, math.radians(stone.tilt_sigma)
     text = f"its steepest side is {math.degrees(slope):.1f}° off level or plumb; it takes no thrust"
-    return _Finding(_SLOPED - slope, sigma, text)
+    return _Finding(SLOPED - slope, sigma, text)
 
 
 _RULES: Mapping[str, tuple[Rule, ...]] = {
@@ -185,7 +183,7 @@ def _stretchers_beside(
         at = places[1][order]
         for index, place in zip(headers, places[0].tolist(), strict=True):
             k = int(np.searchsorted(at, place))
-            neighbours = beside[max(k - _BESIDE // 2, 0) : k + _BESIDE // 2].tolist()
+            neighbours = beside[max(k - BESIDE // 2, 0) : k + BESIDE // 2].tolist()
             if len(neighbours) >= 2:
                 expected[index] = _middle([stones[i] for i in neighbours], "stretchers beside it are")
             elif whole is not None:

@@ -5,6 +5,7 @@ its kind, and no neighbour follows its side, as a voussoir follows a skewback. I
 kind; several stones of an odd size, such as half bricks at the end of a wall, are a habit of the masons.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,20 +15,19 @@ import numpy as np
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools
+from survey.conventions import BROKEN, ENOUGH, GROSS, MOST, ONE_WAY, SOME, WEAR, WIDEST_JOINT
 from survey.geometry.polygons import ring_area, seamless
-from survey.quality.canon import ENOUGH
 from survey.quality.facades import facades_of
 
-_DEEP = 0.03  # thickness of the overlap of two faces [m]: two usual joints, more than rough edges interlock
-_JOINT = 0.05  # distance of the boxes of two faces that have a joint [m]
 _BESIDE = 0.25  # distance of two faces, one in front of the other, beyond which they do not collide [m]
-_SPIKE = 30.0  # angle that no dressed stone of four corners or more has [degrees]
+_SPIKE = math.degrees(ONE_WAY)  # angle that no dressed stone of four corners or more has [degrees]
 _ASKEW = 15.0  # least departure of an angle from those of its kind [degrees]: 8 cm on a side of 30 cm
-_LARGER = 0.25  # least departure of a size from that of its kind, over the median [-]
-_ODD = 6.0  # robust standard deviations from the median of the kind: quarries do not cut normal distributions
-_CUT = 0.08  # length of a side up to which it may be that of a corner broken off [m]
-_ALONE = 0.05  # distance of the middle of a side from all other faces [m]: no joint is so wide
-_ALIKE = 0.5  # of the departure of one stone: that of another which is odd in the same way [-]
+_LARGER = SOME  # least departure of a size from that of its kind, over the median [-]
+_ODD = (
+    GROSS  # robust standard deviations from the median of the kind: quarries do not cut normal distributions
+)
+_CUT = BROKEN  # length of a side up to which it may be that of a corner broken off [m]
+_ALIKE = MOST  # of the departure of one stone: that of another which is odd in the same way [-]
 _COMPANY = 2  # other stones that are odd in the same way, from which it is a habit
 
 
@@ -124,7 +124,7 @@ def _overlaps(members: Sequence[SeenFace], flat: Sequence[Array], away: Array) -
             continue
         common = _common(flat[i], flat[j])
         depth = _thickness(common)
-        if depth > _DEEP:
+        if depth > WEAR:
             for first, second in ((members[i], members[j]), (members[j], members[i])):
                 text = f"its face overlaps that of {second.code} by {ring_area(common) * 1e4:.0f} cm²"
                 yield Misplaced(first.code, first.line, Sign.OVERLAP, depth, text)
@@ -132,7 +132,7 @@ def _overlaps(members: Sequence[SeenFace], flat: Sequence[Array], away: Array) -
 
 def _seams(members: Sequence[SeenFace], flat: Sequence[Array]) -> Iterator[Misplaced]:
     """Yield the first of two stones without a joint between them, where others have one."""
-    for pair in seamless(flat, _near(flat, -_JOINT)):
+    for pair in seamless(flat, _near(flat, -WIDEST_JOINT)):
         first, second = members[pair.first], members[pair.second]
         text = (
             f"no joint parts it from {second.code} ({pair.gap * 1e3:.0f} mm; others are {pair.usual * 1e3:.0f} mm "
@@ -141,7 +141,7 @@ def _seams(members: Sequence[SeenFace], flat: Sequence[Array]) -> Iterator[Mispl
         yield Misplaced(first.code, first.line, Sign.SEAM, pair.usual - pair.gap, text)
 
 
-def _near(flat: Sequence[Array], deep: float = _DEEP) -> Iterator[tuple[int, int]]:
+def _near(flat: Sequence[Array], deep: float = WEAR) -> Iterator[tuple[int, int]]:
     """Yield the pairs of polygons whose boxes overlap by a depth [m]; of a negative one, that are no farther apart."""
     low, high = np.array([one.min(axis=0) for one in flat]), np.array([one.max(axis=0) for one in flat])
     order = np.argsort(low[:, 0], kind="stable")
@@ -234,7 +234,7 @@ def _is_alone(flat: Sequence[Array], k: int, odd: Bools) -> bool:
     if not others or not len(middles):
         return len(middles) > 0
     starts, ends = np.concatenate(others), np.concatenate([np.roll(one, -1, axis=0) for one in others])
-    return bool((_distances(middles, starts, ends).min(axis=1) > _ALONE).any())
+    return bool((_distances(middles, starts, ends).min(axis=1) > WIDEST_JOINT).any())
 
 
 def _angles(face: SeenFace) -> Array:

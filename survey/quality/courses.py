@@ -17,18 +17,16 @@ import numpy as np
 from scipy.special import stdtr
 
 from survey.arrays import Array, Ints
+from survey.conventions import BROKEN, CERTAIN, ENOUGH, ONE_WAY, SOME
 from survey.quality.bed_fit import BedCorners, BedScatter, corner_roughness, fit_bed, pool, scatter_of
 from survey.quality.facades import Facade, WallPlane
 from survey.quality.precision import StoneQuality
 from survey.quality.wedges import Side, lies_along, sides_of, spanning_stones
 
-ENOUGH = 5
-"""Least number of stones for the scatter of a course's beds: with fewer, τ is uncertain by half."""
-
-_BEVEL = 0.10  # longest lower side that is a bevel if it rises [m]
-_RISES = 4.0  # standard deviations by which its upper end lies higher
-_ARRIS = 0.25  # of the longest side of a stone: shorter ones beside a cut are its arris
-_LEVEL = math.tan(math.radians(30.0))  # largest slope of a bed; steeper lower sides are worn or bevelled
+_BEVEL = BROKEN  # longest lower side that is a bevel if it rises [m]
+_RISES = CERTAIN  # standard deviations by which its upper end lies higher
+_ARRIS = SOME  # of the longest side of a stone: shorter ones beside a cut are its arris
+_LEVEL = math.tan(ONE_WAY)  # largest slope of a bed; steeper lower sides are worn or bevelled
 
 
 @dataclass(frozen=True)

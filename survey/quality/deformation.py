@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
-from survey.quality.courses import ENOUGH, CourseLine
+from survey.conventions import ENOUGH
+from survey.quality.courses import CourseLine
 from survey.quality.departures.beds import measure_beds
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality

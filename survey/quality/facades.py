@@ -1,5 +1,6 @@
 """Facades: stones that face one way, and the elevation in which they are drawn and measured."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools
+from survey.conventions import MAX_ITERATIONS, ONE_WAY
 
-WIDEST = 30.0
+WIDEST = math.degrees(ONE_WAY)
 """Largest angle of a face from the mean direction of its facade [degrees]."""
 
 LEVEL = 45.0
 """Inclination above which a face belongs to no facade: a floor, a soffit, a coping [degrees]."""
-
-_MAX_ITERATIONS = 50  # until the mean direction and its stones agree; usually three or four
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,9 @@ def _turns(normals: Array, areas: Array, standing: NDArray[np.intp]) -> Iterable
 def _gather(level: Array, areas: Array) -> Bools:
     """Return the plan directions (n, 2) that belong to the facade of the largest area."""
     mean, mine = _peak(level, areas), np.ones(len(level), dtype=bool)
-    for count in range(_MAX_ITERATIONS):
+    for count in range(MAX_ITERATIONS):
         within = level @ mean >= np.cos(np.radians(WIDEST))
-        if count > _MAX_ITERATIONS // 2:
+        if count > MAX_ITERATIONS // 2:
             within &= mine  # two faces that keep excluding each other: drop both
         if not within.any():
             break

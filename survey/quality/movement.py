@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
+from survey.conventions import ENOUGH
 from survey.quality.bed_fit import BedCorners, BedScatter, fit_bed
-from survey.quality.courses import ENOUGH, CourseLine
+from survey.quality.courses import CourseLine
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array, Ints
+from survey.conventions import SIGNIFICANT
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.faces.roughness import SIGNIFICANT, TOLERANCE
+from survey.faces.roughness import TOLERANCE
 
 _NOTHING = "no stone has points of its own on its face: nothing was measured that could be judged"
 _REACH, _BIN = 5.0, 0.25  # of the histogram [standard deviations]; the end bins hold all beyond

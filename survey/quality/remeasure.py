@@ -12,6 +12,7 @@ from enum import IntEnum
 
 from scipy.special import chdtri, ndtri
 
+from survey.conventions import ENOUGH, RARE, SOME
 from survey.faces.shapes import ShapeKind
 from survey.quality.contradictions import Contradiction
 from survey.quality.corners import Misplaced, Sign
@@ -23,7 +24,7 @@ TILT = 0.5
 """Uncertainty of a plane's tilt above which it is too weak: 0.4 m behind the face it makes a hidden corner
 uncertain by 3.5 mm, a third of a joint [degrees]."""
 
-BLUNDERS = 0.25
+BLUNDERS = SOME
 """Part of a face's points left out above which the rest is doubtful: no fit survives half, and faults come in
 patches."""
 
@@ -33,9 +34,8 @@ SCATTER = 1.5
 SMOOTH = 1.0 / 3.0
 """Scatter of a face's points over the stated sigma below which they were interpolated, not measured."""
 
-_UNLIKELY = 0.001  # probability that a survey of sound stones has one listed for its scatter by mistake
 _COMMON = 0.2  # part of the stones above which they share a weakness: it is the survey's
-_MANY = 5  # stones from which that is so
+_MANY = ENOUGH  # stones from which that is so
 _ROWS = 12  # longest list that is worked off in a day
 _ASKED = 40  # stones of which it is asked what depends on them, the most urgent
 _TOGETHER = 2  # points that chance leaves out together; of three, chance has no share
@@ -188,7 +188,7 @@ def list_remeasures(
     remeasures = [_missing(reject, made) for reject in rejects]
     scale = quality.sigma0 or 1.0
     for stone in stones:
-        remeasures += _reasons(stone, scale, _UNLIKELY / len(stones))
+        remeasures += _reasons(stone, scale, RARE / len(stones))
     remeasures += [
         Remeasure(
             depth.code,

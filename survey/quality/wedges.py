@@ -12,24 +12,23 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
+from survey.conventions import ALIKE, GROUP, LARGELY, LEVEL, MOST, NEGLIGIBLE, SOME, WIDEST_JOINT
 from survey.quality.facades import Facade, upright_frame
 from survey.quality.precision import StoneQuality
 
 _ARCH = ("voussoir", "keystone")
 _SPANNING = (*_ARCH, "lintel")
 _REACH = 3.0  # of the stone's larger dimension: distance within which its neighbours in the arch are
-_BULGE = 0.02  # least rise over the chord of the neighbours, over their distance, that shows the extrados
-_LEVEL = 0.5  # sine of a radius' rise below which it does not show which end is up
-_SHORT = 0.5  # of the smaller extent of a face: length below which a side is an arris or a worn corner
-_JOINT = 0.05  # widest joint between two stones that touch [m]
-_ALONG = math.radians(15.0)  # largest angle between two sides of a joint
-_OVERLAP = 0.6  # of the longer of two sides of a radial joint: their common length, at least
-_CONVERGES = math.radians(2.0)  # least angle between the joints of an arch stone: stones are cut to 1° or 2°
-_FAN = math.radians(
-    20.0
-)  # least angle that the joints of an arch turn by: a flat arch's turn by 30° and more
-_MIN_FAN_STONES = 3  # least number of stones in such a fan
-_SOME = 0.25  # of the shorter of two sides: common length beyond which one lies along the other
+_BULGE = (
+    NEGLIGIBLE  # least rise over the chord of the neighbours, over their distance, that shows the extrados
+)
+_LEVEL = MOST  # sine of a radius' rise below which it does not show which end is up
+_SHORT = MOST  # of the smaller extent of a face: length below which a side is an arris or a worn corner
+_ALONG = ALIKE  # largest angle between two sides of a joint
+_OVERLAP = LARGELY  # of the longer of two sides of a radial joint: their common length, at least
+_CONVERGES = LEVEL  # least angle between the joints of an arch stone: stones are cut to 1° or 2°
+_FAN = ALIKE  # least angle that the joints of an arch turn by: a flat arch's turn by 30° and more
+_MIN_FAN_STONES = GROUP  # least number of stones in such a fan
 
 
 @dataclass(frozen=True)
@@ -161,8 +160,8 @@ def lies_along(start: Array, run: Array, sides: Side) -> NDArray[np.bool_]:
         ends = np.stack([first, first + sides.run])
         along, across = ends @ direction, ends @ np.array([-direction[1], direction[0]])
         common = np.minimum(along.max(axis=0), length[k]) - np.maximum(along.min(axis=0), 0.0)
-        close = (np.abs(across.mean(axis=0)) <= _JOINT) & (np.abs(across).min(axis=0) <= _JOINT)
-        lying[k] = bool((parallel & close & (common >= _SOME * np.minimum(length[k], lengths))).any())
+        close = (np.abs(across.mean(axis=0)) <= WIDEST_JOINT) & (np.abs(across).min(axis=0) <= WIDEST_JOINT)
+        lying[k] = bool((parallel & close & (common >= SOME * np.minimum(length[k], lengths))).any())
     return lying
 
 
@@ -179,7 +178,7 @@ def _radial_joints(sides: Side) -> _Joints:
     """Return the joints between sides that are nearly as long as each other and lie along each other."""
     middle, length = sides.start + 0.5 * sides.run, sides.length
     pairs = (
-        cKDTree(middle).query_pairs(4.0 * _JOINT, output_type="ndarray")
+        cKDTree(middle).query_pairs(4.0 * WIDEST_JOINT, output_type="ndarray")
         if len(middle)
         else np.zeros((0, 2), int)
     )
@@ -193,7 +192,7 @@ def _radial_joints(sides: Side) -> _Joints:
     chosen = (
         (sides.stone[a] != sides.stone[b])
         & facing
-        & (apart <= _JOINT)
+        & (apart <= WIDEST_JOINT)
         & (common >= _OVERLAP * np.maximum(length[a], length[b]))
     )
     here, there = np.concatenate([a[chosen], b[chosen]]), np.concatenate([b[chosen], a[chosen]])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ground.errors import MomaError, SurveyError
-from survey.arrays import Array
+from survey.arrays import Array, no_pixels
 from survey.records.review import Doubtful
 from survey.records.snapping import Snapping
 
@@ -299,7 +299,7 @@ class BlockRecord:
     zone: str | None = None
     station: str | None = None
     photograph: str | None = None
-    image: Array = field(default_factory=lambda: np.empty((0, 2)))
+    image: Array = field(default_factory=no_pixels)
     sigmas: Array | None = None
     names: tuple[str, ...] = ()
     extrusion: Extrusion | None = None

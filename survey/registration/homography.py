@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ground.errors import GeometryError
 from survey.arrays import Array, Bools
+from survey.conventions import ENOUGH, EPSILON, GROSS, MAX_ITERATIONS
 from survey.registration.outliers import Agreement, find_outliers, point_tests
 from survey.registration.projective import (
     ReducedFrame,
@@ -25,10 +26,8 @@ from survey.registration.projective import (
     mapped_points,
 )
 
-_MAX_STEPS = 30  # of the adjustment; good marks need four
-_CLOSE = 1e-12  # step of the reduced parameters, which are of the order of 1, that is rounding
-_TESTABLE = 5  # least number of points without the outliers: any four agree exactly
-_APART = 5.0  # least distance of a point from another or from a line, in standard deviations
+_TESTABLE = ENOUGH  # least number of points without the outliers: any four agree exactly
+_APART = GROSS  # least distance of a point from another or from a line, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -252,7 +251,7 @@ def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Agreement] | No
     if matrix is None or (u[accepted] @ matrix[2, :2] + 1.0).min() <= 0.0:
         return None
     adjusted = u.copy()
-    for _ in range(_MAX_STEPS):
+    for _ in range(MAX_ITERATIONS):
         misclosures, covariances, by_point, by_parameter = linearised(matrix, u, adjusted, y, variances)
         weights = np.linalg.inv(covariances)
         turned = by_parameter.transpose(0, 2, 1) @ weights
@@ -264,7 +263,7 @@ def _adjust(marks: _Marks, accepted: Bools) -> tuple[Homography, Agreement] | No
         adjusted[~accepted] = u[~accepted]
         if not ((adjusted[accepted] @ matrix[2, :2] + 1.0).min() > 0.0):
             return None
-        if np.abs(step).max() <= _CLOSE:
+        if np.abs(step).max() <= EPSILON:
             break
     return _result(marks, accepted, (matrix, *frames), linearised(matrix, u, adjusted, y, variances))
 

@@ -6,6 +6,7 @@ projected square to the plane: the farther one stands out, the less weight it ha
 relief of the wall are left out.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.special import stdtrit
 from ground.errors import GeometryError
 from ground.statistics.scale import deviation
 from survey.arrays import Array
+from survey.conventions import FEW, MOST, PARALLEL, TENTH
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import Photograph
 from survey.registration.homography import Homography, fit_homography
@@ -22,10 +24,10 @@ from survey.registration.homography import Homography, fit_homography
 OFF_SQUARE = float(np.tan(np.radians(15.0)))
 """Standard deviation of the tangent between a line of sight from an unknown station and the wall's normal."""
 
-_GRAZING = float(np.sin(np.radians(10.0)))  # flattest useful line of sight
-_FARTHEST = 0.5  # largest distance of corners outside the marks, in sizes of these
-_RELIEF = 0.1  # largest distance of faces from the plane of the wall, in distances between marks
-_NEAREST_HORIZON = 0.05  # least denominator of the homography; 1 amid the marks
+_GRAZING = math.sin(PARALLEL)  # flattest useful line of sight
+_FARTHEST = MOST  # largest distance of corners outside the marks, in sizes of these
+_RELIEF = TENTH  # largest distance of faces from the plane of the wall, in distances between marks
+_NEAREST_HORIZON = FEW  # least denominator of the homography; 1 amid the marks
 
 
 @dataclass(frozen=True)

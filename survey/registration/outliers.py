@@ -19,13 +19,10 @@ import numpy as np
 from scipy.special import chdtri
 
 from survey.arrays import Array, Bools
+from survey.conventions import ODDS, PER_MILLE, RARE
 
-LEVEL = 1e-3
-"""Probability that a sound point, or a sound set of points, is rejected: Baarda's α₀."""
-
-_CONTROLLED = 1e-3  # share of an error in the point's own residual below which it cannot be tested
+_CONTROLLED = PER_MILLE  # share of an error in the point's own residual below which it cannot be tested
 _MAX_SUBSETS = 600  # number beyond which only sets that contain the best smaller one are tried
-_RIVAL = 6.0  # difference of the sums of squares at which one explanation is 20 times likelier than another
 _NARROW = 1.5  # factor of a test beyond its limit below which chance is a plausible reason
 
 
@@ -58,7 +55,7 @@ class Agreement:
         """True if the sum of squares and every fitted point pass their tests."""
         if self.redundancy == 0:
             return True
-        return self.squares <= float(chdtri(self.redundancy, LEVEL)) and not self.failed.any()
+        return self.squares <= float(chdtri(self.redundancy, RARE)) and not self.failed.any()
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,7 @@ def point_tests(
 
     Returns
     -------
-    tests, limits : (n,) square root of T, nan if the other points do not control it; its limit at `LEVEL`
+    tests, limits : (n,) square root of T, nan if the other points do not control it; its limit at `RARE`
     """
     whiten = np.linalg.inv(np.linalg.cholesky(covariances))
     whitened = whiten @ effects
@@ -103,7 +100,7 @@ def point_tests(
     squares = np.where(controlled, along**2 / np.where(controlled, shares, 1.0), 0.0).sum(axis=1)
     freedom = controlled.sum(axis=1)
     tests = np.where(freedom > 0, np.sqrt(squares), np.nan)
-    return tests, np.sqrt(chdtri(np.maximum(freedom, 1), LEVEL))
+    return tests, np.sqrt(chdtri(np.maximum(freedom, 1), RARE))
 
 
 def find_outliers(count: int, smallest: int, judge: Callable[[Bools], Agreement | None]) -> Outliers:
@@ -155,7 +152,7 @@ def _judged(
 
 def _decide(explanations: list[tuple[float, tuple[int, ...]]], whole: Agreement | None) -> Outliers:
     least, best = min(explanations)
-    rivals = [subset for squares, subset in explanations if squares - least < _RIVAL]
+    rivals = [subset for squares, subset in explanations if squares - least < ODDS]
     narrow = whole is not None and not (np.nan_to_num(whole.tests) > _NARROW * whole.limits).any()
     if len(rivals) == 1 or narrow:
         return Outliers(rejected=best)

@@ -8,6 +8,7 @@ the photograph; where the station is not known they move square to the marks' pl
 line of sight.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,17 +16,15 @@ import numpy as np
 
 from ground.errors import GeometryError, MomaError, SurveyError
 from survey.arrays import Array
+from survey.conventions import CRITICAL, LEAST, PARALLEL, TENTH, VANISHING
 from survey.faces.common_planes import CommonPlane, PlaneEstimate, common_plane
 from survey.faces.neighbours import MeasuredFace, Neighbours
 from survey.faces.planes import FaceFit, fit_plane
 from survey.records.survey import BlockRecord, Photograph, SurveyHead
 from survey.registration.marked_walls import OFF_SQUARE, MarkedWall, wall_of_marks
 
-_COARSEST = 0.1  # largest standard deviation of a corner over the size of the stone
-_SMALLEST = 1e-3  # least distance between the farthest corners [m]
-_MIN_SIGMA = 1e-9  # standard deviation that is rounding [rad, m]
-_CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_GRAZING = float(np.sin(np.radians(10.0)))  # flattest useful line of sight
+_COARSEST = TENTH  # largest standard deviation of a corner over the size of the stone
+_GRAZING = math.sin(PARALLEL)  # flattest useful line of sight
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,7 @@ def lift(
             f"it has {len(record.image)} corners on the photograph", remedy="measure 3 or more"
         )
     on_marks, covariances = wall.on_plane(record.image)
-    if _size(on_marks) < _SMALLEST:
+    if _size(on_marks) < LEAST:
         raise GeometryError("its corners on the photograph coincide", remedy="measure them again")
     fit, plane = _face_plane(record, _predicted(on_marks, wall, neighbours, whole), on_marks, wall)
     outline, sigma = _moved(on_marks, covariances, wall, plane)
@@ -193,7 +192,7 @@ def _face_plane(
     # the stone may stand out, so its own points outweigh its surroundings
     heights = (points - plane.centroid) @ plane.normal
     tests = np.abs(heights) / np.hypot(plane.height_sigma(points), sigmas)
-    if tests.max() > _CRITICAL:
+    if tests.max() > CRITICAL:
         remarks.append(
             f"which lie up to {np.abs(heights).max() * 1e3:.0f} mm off ({tests.max():.1f} standard deviations)"
         )
@@ -231,13 +230,13 @@ def _moved(
 def _as_fit(plane: PlaneEstimate, outline: Array) -> FaceFit:
     """Express a predicted plane as a fit, about the place where its height does not depend on its tilts."""
     tilts, directions = np.linalg.eigh(plane.covariance[:2, :2])
-    axes, tilts = directions.T @ plane.axes, np.maximum(tilts, _MIN_SIGMA**2)
+    axes, tilts = directions.T @ plane.axes, np.maximum(tilts, VANISHING**2)
     # limit correlations to 1 where a variance is rounding alone
     most = np.sqrt(tilts * plane.covariance[2, 2])
     across = np.clip(directions.T @ plane.covariance[:2, 2], -most, most)
     # smallest spread of the tilts first, as the axis along which a measured face is longest
     centroid = plane.centroid - (across / tilts) @ axes
-    height = max(plane.covariance[2, 2] - float((across**2 / tilts).sum()), _MIN_SIGMA**2)
+    height = max(plane.covariance[2, 2] - float((across**2 / tilts).sum()), VANISHING**2)
     return FaceFit(
         normal=plane.normal,
         offset=float(plane.normal @ centroid),

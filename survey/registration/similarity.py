@@ -14,10 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array, Bools
+from survey.conventions import EPSILON, MAX_ITERATIONS
 from survey.registration.outliers import Agreement, point_tests
-
-_MAX_STEPS = 30  # of the adjustment; good points need four
-_CLOSE = 1e-14  # step, relative to the size of the set, that is rounding
 
 
 @dataclass(frozen=True)
@@ -107,7 +105,7 @@ def adjust_similarity(
     shift, size = np.zeros(3), float(spread[1]) / np.sqrt(len(some))
     before = (rotation, scale, shift)
     least = np.inf
-    for _ in range(_MAX_STEPS):
+    for _ in range(MAX_ITERATIONS):
         residuals, weights, arms = _linearised(x, y, (sx, sy), rotation, scale, shift)
         squares = float(weights[some] @ (residuals[some] ** 2).sum(axis=1))
         if squares > least * (1.0 + 1e-9):  # steps may diverge for sets that no similarity fits
@@ -118,7 +116,7 @@ def adjust_similarity(
         shift = shift + step[:3]
         rotation = _turn(step[3:6]) @ rotation
         scale *= float(np.exp(np.clip(step[6], -1.0, 1.0)))
-        if np.abs(step * [1.0, 1.0, 1.0, size, size, size, size]).max() <= _CLOSE * size:
+        if np.abs(step * [1.0, 1.0, 1.0, size, size, size, size]).max() <= EPSILON * size:
             break
     arms = _linearised(x, y, (sx, sy), rotation, scale, shift)[2]
     centre = np.average((arms[some] / scale) @ rotation, axis=0, weights=weights[some])

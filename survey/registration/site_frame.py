@@ -21,14 +21,15 @@ from scipy.special import ndtri
 
 from ground.errors import SurveyError
 from survey.arrays import Array, Bools
+from survey.conventions import CHECKED, RARE, TENTH
 from survey.records.survey import BlockRecord, ControlPoint, Extrusion, SolidRecord, SurveyHead
-from survey.registration.outliers import LEVEL, Agreement, find_outliers
+from survey.registration.outliers import Agreement, find_outliers
 from survey.registration.similarity import Similarity, adjust_similarity
 
 Stone = TypeVar("Stone", bound=BlockRecord | SolidRecord)
 
-_WEAKEST_ANGLE = 0.1  # standard deviation of a rotation beyond which it is not determined [rad]
-_TESTABLE = 4  # least number of points without the outliers: any three nearly agree by themselves
+_WEAKEST_ANGLE = TENTH  # standard deviation of a rotation beyond which it is not determined [rad]
+_TESTABLE = CHECKED  # least number of points without the outliers: any three nearly agree by themselves
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class SiteTransform:
     @property
     def scale_differs(self) -> bool:
         """True if the scale differs from 1 by more than chance does once in a thousand."""
-        return abs(self.scale_test) > -float(ndtri(LEVEL / 2.0))
+        return abs(self.scale_test) > -float(ndtri(RARE / 2.0))
 
     def apply(self, points: ArrayLike) -> Array:
         """Move points (…, 3) of the survey into the site frame [m]."""

@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from ground.errors import MomaError
+from survey.conventions import TRIALS
 from survey.extrusion.depth import depth_for
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.extrusion.imported_solids import block_of_solid
@@ -18,10 +19,6 @@ from survey.records.snapping import Snapping
 from survey.records.survey import BlockRecord, Reject, SolidRecord, SurveyHead, SurveyStream
 from survey.registration.photographed_stones import LiftedFace, lift_faces
 from survey.registration.site_frame import SiteTransform, fit_similarity, record_to_site, to_site
-
-_SAMPLE = (
-    300  # first stones of a survey, from whose faces its roughness is estimated: known to a few per cent
-)
 
 
 @dataclass(frozen=True)
@@ -123,7 +120,7 @@ def _with_roughness(
             first.append(item)
             if isinstance(item, BlockRecord) and item.photograph is None:
                 sample.append(item)
-                if len(sample) == _SAMPLE:
+                if len(sample) == TRIALS:
                     break
         rough = estimate_roughness(sample)
     for item in chain(first, items):

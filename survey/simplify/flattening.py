@@ -16,16 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import EPSILON, FLAT, TENTH
 from survey.geometry.convexity import is_convex
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import face_vectors, from_edges
 
 Face = tuple[int, ...]
 
-_WARP = 0.1  # of a stone's width: largest displacement of a corner that makes its warped faces plane
-_SAME_SIDE = 0.9  # least cosine between normals, which are poor in thin triangles: heights decide
-_PLANE = 1e-13  # of a solid's size: distance of a corner from its planes that is due to rounding
-_SHALLOWEST = 1e-4  # determinant of three unit normals below which their intersection is undetermined
+_WARP = TENTH  # of a stone's width: largest displacement of a corner that makes its warped faces plane
+_SAME_SIDE = 1.0 - TENTH  # least cosine between normals, which are poor in thin triangles: heights decide
+_SHALLOWEST = FLAT  # determinant of three unit normals below which their intersection is undetermined
 
 
 @dataclass(frozen=True)
@@ -187,5 +187,5 @@ def _crossings(corners: Array, planes: Array, around: list[list[int]]) -> Array 
     if np.abs(np.linalg.det(three[:, :, :3])).min() < _SHALLOWEST:
         return None
     moved = corners - np.linalg.solve(three[:, :, :3], heights[:, :, None])[:, :, 0]
-    on_planes = np.abs(heights).max(axis=1) <= _PLANE * float(np.ptp(corners, axis=0).max())
+    on_planes = np.abs(heights).max(axis=1) <= EPSILON * float(np.ptp(corners, axis=0).max())
     return np.where(on_planes[:, None], corners, moved)

@@ -4,6 +4,7 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import EPSILON, VANISHING
 from survey.extrusion.extrusion import SurveyedBlock, prism
 from survey.geometry.folds import fold, warp
 from survey.geometry.plane_network import settle
@@ -21,8 +22,6 @@ from survey.simplify.result import BlockShape, SimpleSolid, Simplified, prism_sh
 from survey.simplify.squaring import SimplifyBounds
 
 _PLANE = 5e-9  # metres: warp of a planar face due to rounding in a national grid
-_CONVEX = 1e-10  # of a stone's size: height below which a corner is on a face
-_FLAT = 1e-12  # of the cube on a stone's length: volume below which a solid is flat
 
 
 def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
@@ -63,7 +62,7 @@ def simplify_solid(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
 
 def _check_full(solid: Solid) -> None:
     volume = solid_volume(solid)
-    if not volume > _FLAT * _size(solid) ** 3:
+    if not volume > EPSILON * _size(solid) ** 3:
         raise GeometryError(
             f"its faces enclose {volume:.3g} m³: it is flat, or seen from inside",
             where=f"stone {solid.code}",
@@ -73,7 +72,7 @@ def _check_full(solid: Solid) -> None:
 
 def _prism(solid: Solid, outward: Array, first: Array) -> Solid | None:
     """Return the solid as a convex prism, its visible corners first; None if it is not one."""
-    return _as_prism(solid, outward, first) if highest_corner(solid) <= _CONVEX * _size(solid) else None
+    return _as_prism(solid, outward, first) if highest_corner(solid) <= VANISHING * _size(solid) else None
 
 
 def _general(old: Solid, tolerance: float) -> Solid:
@@ -119,7 +118,7 @@ def _describe(old: Solid, new: Solid, flat: FlatSolid) -> str:
 def _why_general(old: Solid, new: Solid) -> str:
     """Return the reasons why a solid stays general."""
     words = [f"stays general, with {len(new.faces)} faces"]
-    if (rise := highest_corner(new)) > _CONVEX * _size(old):
+    if (rise := highest_corner(new)) > VANISHING * _size(old):
         words.append(f"not convex, a corner stands {rise * 1e3:.2g} mm above the plane of a face")
     else:
         words.append("convex, but no prism of which three planes meet in each corner")

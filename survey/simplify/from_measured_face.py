@@ -4,6 +4,7 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array, Bools
+from survey.conventions import EPSILON, TOUCHING
 from survey.extrusion.extrusion import SurveyedBlock, hidden_side, prism
 from survey.geometry.solids import Solid
 from survey.simplify.blockiness import (
@@ -17,9 +18,6 @@ from survey.simplify.blockiness import (
 from survey.simplify.result import BlockShape, SimpleSolid, Simplified, prism_shape
 from survey.simplify.squaring import SimplifyBounds, SquaredFace, nearest_quadrilateral, square_face
 from survey.simplify.worn_corners import restore_worn
-
-_EQUAL = 1e-12  # of a stone's size: difference below which coordinates are equal
-_SLIVER = 1e-6  # metres, and of its length: thickness below which a solid encloses nothing
 
 
 def simplify_face(block: SurveyedBlock, bounds: SimplifyBounds) -> SimpleSolid:
@@ -86,7 +84,7 @@ def _check_flat(block: SurveyedBlock, squared: SquaredFace) -> None:
             remedy="measure 3 corners or more that are not on one line",
         )
     length = float(np.ptp(squared.corners, axis=0).max())
-    if not min(squared.width, block.depth.value) > _SLIVER * max(length, 1.0):
+    if not min(squared.width, block.depth.value) > TOUCHING * max(length, 1.0):
         raise GeometryError(
             f"it is flat: its face is {squared.width * 1e3:.2g} mm wide, its depth {block.depth.value * 1e3:.2g} mm",
             where=where,
@@ -107,7 +105,7 @@ def _extruded(block: SurveyedBlock, squared: SquaredFace, axes: Array) -> Solid:
         nearest = np.spacing(
             np.abs(solid.vertices).max()
         )  # what rounding leaves of places far from the origin
-        if np.abs(solid.vertices - block.solid.vertices).max() <= _EQUAL * size + 4.0 * nearest:
+        if np.abs(solid.vertices - block.solid.vertices).max() <= EPSILON * size + 4.0 * nearest:
             return block.solid
     return solid
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import SOME, TENTH, WEAR
 from survey.simplify._kernels.squaring import square
 
 _BOUNDLESS = np.array([np.inf, np.inf, np.inf, np.inf, 0.0])
@@ -33,10 +34,10 @@ class SimplifyBounds:
     least_tolerance : tolerance of a survey that is more precise than this, or of unknown precision [m]
     """
 
-    max_shift: float = 0.03
-    shift_share: float = 0.1
+    max_shift: float = WEAR
+    shift_share: float = TENTH
     max_restored: float = 0.06
-    restored_share: float = 0.25
+    restored_share: float = SOME
     least_tolerance: float = 0.002
 
 

@@ -13,11 +13,12 @@ from itertools import pairwise
 import numpy as np
 
 from survey.arrays import Array, Bools
+from survey.conventions import CHECKED, MOST
 from survey.simplify.squaring import SquaredFace
 
-_FEWEST_BESIDE_SOUND = 4  # least number of points that give the width of the margin
+_FEWEST_BESIDE_SOUND = CHECKED  # least number of points that give the width of the margin
 _FEWEST_BESIDE_WORN = 2  # least number of points that give a side: one finds it, another checks
-_REACH = 0.5  # of the side's length: least distance from the sound end of a point beside no other side
+_REACH = MOST  # of the side's length: least distance from the sound end of a point beside no other side
 
 
 def restore_worn(

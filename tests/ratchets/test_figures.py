@@ -8,12 +8,12 @@ import pytest
 from tests.ratchets.figures import FIGURES, WORDS, identifier, parameters, per_10_000
 
 MOST = {
-    "numbers of ground": 23,
+    "numbers of ground": 22,
     "numbers of moma": 20,
-    "numbers of survey": 912,
+    "numbers of survey": 304,
     "numbers of archmodel": 92,
     "numbers of mechanics": 740,
-    "numbers of pipelines": 534,
+    "numbers of pipelines": 246,
     "long functions": 25,
     "wide functions": 0,
     "undocumented functions": 0,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ground.errors import UsageError
+from ground.units import GRAVITY
 from mechanics.limit.kinematic import Kinematics
 from pipelines.scene.site import Site, damping_factor
 
@@ -74,7 +75,7 @@ class CodeCheck:
 _KINDS = ("linear", "nonlinear")
 
 
-def check_code(code: str, site: Site, kinematics: Kinematics, gravity: float = 9.81) -> CodeCheck:
+def check_code(code: str, site: Site, kinematics: Kinematics, gravity: float = GRAVITY) -> CodeCheck:
     """Check the mechanism of a limit load.
 
     Parameters

@@ -14,11 +14,11 @@ from pipelines.assess.diagnosis.file import DiagnosisFile
 from pipelines.assess.diagnosis.measurements import Measurements
 from pipelines.assess.diagnosis.ranking import Ranked, Ranking
 from pipelines.assess.motions import Motions
+from survey.conventions import LISTED, NOTICEABLE
 from survey.quality.departures.beds import measure_beds
 from survey.quality.movement import CourseMovement, compare_courses
 
-_MAX_NAMED = 3  # courses of a phase that are told, nearest to the break
-_FELT = 2.0  # standard deviations of a movement below which a phase says nothing
+_FELT = NOTICEABLE  # standard deviations of a movement below which a phase says nothing
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _evidence(
         # the last courses of a phase before the break, the first of the later one
         nearest = sorted(dated, key=lambda line: line.line.course, reverse=index == 0)
         texts = [text for line in nearest if (text := _course(line, measurements.resting)) is not None]
-        yield from texts[:_MAX_NAMED]
+        yield from texts[:LISTED]
 
 
 def _course(line: CourseMovement, resting: frozenset[str]) -> str | None:

@@ -16,6 +16,7 @@ from ground.toml.lines import key_lines, parse_toml, read_text
 from ground.toml.schema import TomlDocument, nearest, tables_of
 from ground.toml.writer import is_table_array
 from pipelines.scene.file import BESIDE
+from survey.conventions import FEW
 
 _LONGEST = 500  # characters of a formula
 _SHOWN = 60  # characters of a formula in a message
@@ -26,7 +27,7 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
-_SHARE = 0.05  # of its range by which an unknown is changed for a derivative [-]
+_SHARE = FEW  # of its range by which an unknown is changed for a derivative [-]
 
 
 @dataclass(frozen=True, kw_only=True)

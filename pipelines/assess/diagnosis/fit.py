@@ -17,12 +17,15 @@ from scipy.optimize import lsq_linear
 
 from mechanics.arrays import Array
 from pipelines.assess.diagnosis.file import Unknown
+from survey.conventions import NEGLIGIBLE, NOTICEABLE, ROUNDS
 
 _TURNS = 12  # of the search
-_ENOUGH = 0.02  # fall of χ² that a step must promise [-]
-_HALVINGS = 4  # of a step that makes χ² grow
+_ENOUGH = NEGLIGIBLE  # fall of χ² that a step must promise [-]
+_HALVINGS = ROUNDS  # of a step that makes χ² grow
 _SCANNED = 8  # values across a range that are tried where the start says nothing; fewer of each of several
-_FELT = 2.0  # change of the residuals over the whole range below which a direction is not determined [-]
+_FELT = (
+    NOTICEABLE  # change of the residuals over the whole range below which a direction is not determined [-]
+)
 
 Ask = Generator[list[tuple[float, ...]], list[Array | str], "Fit"]
 """Search that asks for the residuals (m,) at amplitudes; the answer is a text where a run has failed."""

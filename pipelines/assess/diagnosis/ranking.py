@@ -9,18 +9,19 @@ from scipy.special import fdtrc, stdtrit
 
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.fit import Fit
+from survey.conventions import FEW, ODDS, PER_CENT, TAIL
 
 STILL = "nothing has moved"
 """Name of the hypothesis without a run, to which all others are compared."""
 
-APART = 6.0
+APART = ODDS
 """Difference of AICc from which two hypotheses are told apart: a relative likelihood of a twentieth."""
 
-QUANTILE = 0.975
+QUANTILE = 1.0 - TAIL
 """Of two-sided 95 % intervals."""
 
-_EXPLAINS = 0.01  # probability of so large a χ² by chance, below which a hypothesis does not explain
-_CORRELATED = 0.95  # correlation of two amplitudes beyond which they are not told apart
+_EXPLAINS = PER_CENT  # probability of so large a χ² by chance, below which a hypothesis does not explain
+_CORRELATED = 1.0 - FEW  # correlation of two amplitudes beyond which they are not told apart
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,10 @@ from scipy.special import stdtrit
 from mechanics.arrays import Array
 from pipelines.assess.diagnosis.file import Unknown
 from pipelines.assess.diagnosis.ranking import QUANTILE, Ranked
+from survey.conventions import MOST
 
-_OFFSETS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # of the runs, in steps of the unknown
-_UNEVEN = 0.5  # standard deviation from the runs over that from the survey, beyond which it is told in the first line
+_OFFSETS = np.linspace(-1.0, 1.0, 5)  # of the runs, in steps of the unknown
+_UNEVEN = MOST  # standard deviation from the runs over that from the survey, beyond which it is told in the first line
 
 Place = tuple[float, ...]
 Answer = Array | str

@@ -4,13 +4,14 @@ import numpy as np
 
 from mechanics.limit.loading_test import LoadingTest
 from pipelines.assess.pushover.band import Band
+from survey.conventions import NEGLIGIBLE, PER_MILLE
 
 # share of turning, or of sliding, from which it is the whole mechanism [-]
 _MOSTLY = 0.85
 # share of steps that may be left unsolved, or that inertia may disturb, without a caution [-]
-_MAX_UNSOLVED_SHARE = 0.02
+_MAX_UNSOLVED_SHARE = NEGLIGIBLE
 # energy that no term explains, up to which there is no caution [-]
-_BALANCE = 1e-3
+_BALANCE = PER_MILLE
 
 
 def headline_of(test: LoadingTest, band: Band | None) -> str:

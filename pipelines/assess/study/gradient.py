@@ -24,10 +24,11 @@ from mechanics.arrays import Array, Bools, Ints
 from mechanics.limit.assembly import RigidAssembly, Strength
 from mechanics.limit.live_loads import LiveLoad
 from pipelines.assess.study.quantities import Limited
+from survey.conventions import PER_CENT, SAME
 
-_KINK = 1e-2
+_KINK = PER_CENT
 """Difference of the changes in the two senses over the change, from which both are needed: curvature makes 1e-4 [-]."""
-_SLIGHT = 1e-6
+_SLIGHT = SAME
 """Change over the largest of a contact that matters to no derivative: a tenth of the error that these may have [-]."""
 
 

@@ -24,8 +24,9 @@ from pipelines.ingest.records import surveyed_block
 from pipelines.results.summary import summarise
 from pipelines.run.assemble import Assembly
 from pipelines.scene.selection import StoneModel
+from survey.conventions import EPSILON
 
-_EXACT = 1e-12
+_EXACT = EPSILON
 """Tolerance of programmes whose velocities are derivatives: at 10⁻⁹ those of six walls are wrong by 6·10⁻⁴ [-]."""
 
 _WIDEST = 2.0

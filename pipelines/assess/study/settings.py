@@ -5,6 +5,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from ground.settings import Setting
+from survey.conventions import FEW
 
 Texts = tuple[str, ...]
 
@@ -86,7 +87,7 @@ class StudyTable:
         ),
     ] = 0
     seed: Annotated[int, Setting("Seed of the random numbers.", at_least=0)] = 1
-    confidence: Annotated[float, Setting("Confidence of intervals.", "-", above=0.5, below=1)] = 0.95
+    confidence: Annotated[float, Setting("Confidence of intervals.", "-", above=0.5, below=1)] = 1.0 - FEW
 
 
 @dataclass(frozen=True)

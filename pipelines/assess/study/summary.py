@@ -23,11 +23,13 @@ from pipelines.assess.study.sampling import Sampler
 from pipelines.assess.study.settings import InputType
 from pipelines.assess.workers.store import Snapshot
 from pipelines.run.record import versions
+from survey.conventions import FEW, TAIL
 
 INDEX = "study.json"
 """Index of the results of a study."""
 
-_SHARES = (0.025, 0.05, 0.5, 0.95, 0.975)
+_TAILS = (TAIL, FEW)
+_SHARES = (*_TAILS, 0.5, *(1.0 - share for share in reversed(_TAILS)))
 """Quantiles that are told."""
 _MOST = 40  # actions that are told
 

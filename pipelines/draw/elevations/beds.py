@@ -15,8 +15,9 @@ from survey.quality.departures.beds import BedMovement, WallBeds
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
-_FINER = 10.0  # largest exaggeration of a course over the smallest [-]
+
+LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
+FINER = 10.0  # largest exaggeration of a course over the smallest [-]
 
 
 def draw_courses(path: Path, lines: Sequence[CourseLine], walls: Sequence[WallBeds] = ()) -> None:
@@ -135,13 +136,13 @@ def _label(line: CourseLine) -> str:
 def _exaggerations(lines: Sequence[CourseLine], levels: Array) -> list[float]:
     """Choose for each course a round factor by which its deviations fill a good part of the space between courses.
 
-    None is more than `_FINER` times the least: the scatter of straight courses would look like movement.
+    None is more than `FINER` times the least: the scatter of straight courses would look like movement.
     """
     gaps = np.diff(np.unique(np.round(levels, 3)))
     room = float(np.median(gaps)) if len(gaps) else 0.3
     largest = [float((np.abs(line.height - line.level) + line.sigma).max()) for line in lines]
-    wanted = [_LARGEST * room / max(extreme, 1e-6) for extreme in largest]
-    return [max(1.0, _round_down(min(factor, _FINER * min(wanted)))) for factor in wanted]
+    wanted = [LARGEST * room / max(extreme, 1e-6) for extreme in largest]
+    return [max(1.0, _round_down(min(factor, FINER * min(wanted)))) for factor in wanted]
 
 
 def _round_down(value: float) -> float:

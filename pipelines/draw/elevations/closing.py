@@ -22,7 +22,8 @@ from pipelines.draw.elevations.sheet import (
     sheet_size,
     write_codes,
 )
-from pipelines.draw.offscreen.parts import robust_ceiling
+from pipelines.draw.offscreen.parts import FINEST_SCALE, robust_ceiling
+from survey.conventions import STEEPEST
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 from survey.quality.facades import Facade
@@ -34,9 +35,7 @@ if TYPE_CHECKING:
 VisibleFace = tuple[Array, tuple[int, ...]]
 
 _UNKNOWN = "#dcd9d4"
-_SEEN = np.cos(np.radians(60.0))  # faces turned farther away are not drawn
-_FINEST = 0.1  # shortest colour scale: smaller movements are not worth a colour [mm]
-_DASHES = (0.0, (4.0, 2.0))
+_SEEN = np.cos(STEEPEST)  # faces turned farther away are not drawn
 _LABELS = {"simplified": "moved by simplifying the stone [mm]", "moved": "moved by closing the joints [mm]"}
 
 
@@ -57,7 +56,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
     faces = [visible_faces(stone.surveyed if simplified else stone.simple, facade) for stone in shown_stones]
     finite = np.concatenate(values)
     finite = finite[np.isfinite(finite)]
-    end, _ = robust_ceiling(finite, _FINEST)
+    end, _ = robust_ceiling(finite, FINEST_SCALE)
     low, high = extent([corners for face in faces for corners, _ in face])
     figure = new_sheet(sheet_size(high - low))
     axes = figure.subplots()
@@ -67,7 +66,7 @@ def draw_moved(path: Path, shapes: ClosingShapes, facade: Facade, step: str) -> 
         (stone.simple if simplified else stone.closed, stone.simplified if simplified else stone.moved)
         for stone in shown_stones
     ]
-    changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * _FINEST]
+    changed = [solid for solid, moved in after if np.nanmax(moved, initial=0.0) > 1e-3 * FINEST_SCALE]
     _outline(axes, [corners for solid in changed for corners, _ in visible_faces(solid, facade)])
     shade = [float(np.nanmean(moved)) / end if np.isfinite(moved).any() else np.nan for moved in values]
     name_stones(axes, shown_stones, faces, shade)
@@ -194,7 +193,7 @@ def _outline(axes: "Axes", polygons: Sequence[Array]) -> None:
     from matplotlib.collections import PolyCollection
 
     axes.add_collection(
-        PolyCollection(polygons, facecolors="none", edgecolors=INK, linewidths=0.7, linestyles=[_DASHES])
+        PolyCollection(polygons, facecolors="none", edgecolors=INK, linewidths=0.7, linestyles="--")
     )
 
 
@@ -218,7 +217,7 @@ def _legend(figure: "Figure", step: str, guessed: bool, unknown: bool) -> None:
     from matplotlib.patches import Patch
 
     after = "as simplified" if step == "simplified" else "as simulated"
-    keys: list[Any] = [Line2D([], [], color=INK, linewidth=0.7, linestyle=_DASHES, label=after)]
+    keys: list[Any] = [Line2D([], [], color=INK, linewidth=0.7, linestyle="--", label=after)]
     if guessed:
         keys.append(guess_key())
     if unknown:

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mechanics.arrays import Array
+from survey.conventions import ROUNDING, TOUCHING
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.grown_leaf import Opening
 from survey.joints.report import ClosingReport, StoneJoint
 
 _FACING = np.cos(np.radians(45.0))  # faces turned farther from the joint are not sides of it
-_NOTHING = 1e-10  # smaller areas are rounding [m²]
-_IN_PLANE = 1e-6  # metres: distance from the plane of a joint within which a corner lies in it
 
 
 @dataclass(frozen=True)
@@ -214,7 +213,7 @@ def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -
     along /= np.linalg.norm(along)
     axes = np.array([along, np.cross(normal, along)])
     best: Array | None = None
-    most = _NOTHING
+    most = ROUNDING
     for above in _sides(first, -normal, axes, centroid):
         for below in _sides(second, normal, axes, centroid):
             common = _clipped(above, below)
@@ -235,7 +234,7 @@ def _sides(solid: Solid, towards: Array, axes: Array, centroid: Array) -> list[A
         if area @ towards > _FACING * float(np.linalg.norm(area)):
             flat = (polygon - centroid) @ axes.T
             sides.append(flat if _area(flat) > 0.0 else flat[::-1])
-            within.append(bool((np.abs((polygon - centroid) @ towards) < _IN_PLANE).all()))
+            within.append(bool((np.abs((polygon - centroid) @ towards) < TOUCHING).all()))
     return [side for side, own in zip(sides, within, strict=True) if own] if any(within) else sides
 
 

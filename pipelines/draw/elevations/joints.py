@@ -21,7 +21,8 @@ from pipelines.draw.elevations.sheet import (
     save_sheet,
     sheet_size,
 )
-from pipelines.draw.offscreen.parts import robust_ceiling
+from pipelines.draw.offscreen.parts import FINEST_SCALE, robust_ceiling
+from survey.conventions import LARGEST, STEEPEST
 from survey.joints.grown_leaf import Opening
 from survey.quality.facades import Facade
 
@@ -30,9 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STONE, _OUTLINE, _OVERLAP, _NEGATIVE = "#efede9", "#d8d4cc", "#000000", "#cc79a7"
-_EDGE_ON = np.sin(np.radians(50.0))  # joints turned farther to the viewer lie behind the faces
-_FINEST = 0.1  # shortest colour scale [mm]
-_NUMBERED = 12  # gaps and overlaps
+_EDGE_ON = np.sin(STEEPEST)  # joints turned farther to the viewer lie behind the faces
 _WIDE = 125  # characters of a line below the picture
 _LINE = 0.185  # height of such a line [in]
 
@@ -92,7 +91,7 @@ def _add_closed(
     if not joints:
         return
     width = np.array([1e3 * joint.joint.width for joint in joints])
-    end, _ = robust_ceiling(width, _FINEST)
+    end, _ = robust_ceiling(width, FINEST_SCALE)
     lines = LineCollection(
         [_trace(joint, facade) for joint in joints],
         array=width,
@@ -171,9 +170,9 @@ def _mark(axes: "Axes", marked: Sequence[Place], facade: Facade) -> None:
     for number, place in enumerate(marked, start=1):
         x, y = project(place.centroid, facade)
         marker, colour = ("D", _OVERLAP) if place.kind == "overlap" else ("o", FLAG)
-        size = 12.0 if number <= _NUMBERED else 5.0
+        size = 12.0 if number <= LARGEST else 5.0
         axes.plot([x], [y], marker, color=colour, markersize=size, markeredgecolor="white", zorder=5)
-        if number <= _NUMBERED:
+        if number <= LARGEST:
             axes.annotate(
                 str(number),
                 (x, y),
@@ -211,7 +210,7 @@ def _keys(shown: Sequence[DrawnJoint], marked: Sequence[Place], places: int, gue
         keys.append(Line2D([], [], color=_NEGATIVE, linewidth=3.0, label="the faces overlapped as surveyed"))
     lines = [
         textwrap.shorten(f"{number}: {place.text}", _WIDE, placeholder=" …")
-        for number, place in enumerate(marked[:_NUMBERED], start=1)
+        for number, place in enumerate(marked[:LARGEST], start=1)
     ]
     if places > len(lines):
         elsewhere = " (some on other sides)" if places > len(marked) else ""

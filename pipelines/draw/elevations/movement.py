@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.arrays import Array
+from pipelines.draw.elevations.beds import FINER, LARGEST
 from pipelines.draw.elevations.sheet import (
     FLAG,
     INK,
@@ -21,8 +22,6 @@ from pipelines.draw.elevations.sheet import (
 from survey.quality.facades import Facade
 from survey.quality.movement import CourseMovement
 
-_LARGEST = 0.45  # the largest deviation as drawn, over the distance between courses [-]
-_FINER = 10.0  # largest exaggeration of a course over the smallest [-]
 _DIVERGING = "RdBu_r"  # low is blue, high is red: the same for colour-blind readers
 
 
@@ -45,8 +44,8 @@ def draw_bed_movement(path: Path, courses: Sequence[CourseMovement]) -> None:
         for (measured, _), own in zip(lines, simulated, strict=True)
     ]
     # one bent course does not flatten the others, and their scatter does not look like movement
-    reach = [max(extreme, max(largest) / _FINER) for extreme in largest]
-    factors = [max(1.0, float(f"{_LARGEST * room / extreme:.1g}")) for extreme in reach]
+    reach = [max(extreme, max(largest) / FINER) for extreme in largest]
+    factors = [max(1.0, float(f"{LARGEST * room / extreme:.1g}")) for extreme in reach]
     figure = new_sheet((10.0, float(np.clip(2.0 + 0.42 * len(courses), 3.5, 24.0))))
     axes = figure.subplots()
     right = max(float(course.line.along.max()) for course in courses)

@@ -11,6 +11,8 @@ import numpy as np
 
 from ground.errors import MissingLibraryError, missing_library
 from mechanics.arrays import Array
+from pipelines.draw.catalogue import READABLE
+from survey.conventions import LARGELY
 from survey.quality.facades import Facade
 
 if TYPE_CHECKING:
@@ -26,8 +28,7 @@ CODES = 250
 """Largest number of stones named on an elevation."""
 
 _PALETTE = "YlGnBu"  # from light to dark: legible in print and to colour-blind readers
-_LIGHTER = 0.8  # part of it that is used [-]: codes and outlines cannot be read on the darkest part
-_DARK = 0.7  # part of the scale beyond which codes are written in white [-]
+_DARK = LARGELY  # part of the scale beyond which codes are written in white [-]
 
 
 def project(points: Array, facade: Facade) -> Array:
@@ -91,7 +92,7 @@ def palette(unknown: str) -> "Colormap":
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
-    return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, _LIGHTER, 256))).with_extremes(bad=unknown)
+    return ListedColormap(colormaps[_PALETTE](np.linspace(0.0, READABLE, 256))).with_extremes(bad=unknown)
 
 
 def require_figures() -> None:

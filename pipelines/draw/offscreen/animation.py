@@ -9,9 +9,9 @@ import numpy as np
 
 from mechanics.arrays import Array, Ints
 from pipelines.draw.offscreen.jobs import run_job
-from pipelines.draw.offscreen.parts import LIGHT, PLAIN, add_edges, mesh_of, new_plotter, place_camera
+from pipelines.draw.offscreen.parts import LIGHT, PLAIN, SIZE, add_edges, mesh_of, new_plotter, place_camera
 
-_SIZE = (800, 650)  # of a picture [px]
+_SIZE = tuple(side // 2 for side in SIZE)  # of a picture [px]
 _COLOURS = 64  # of the file's palette
 _LAST = 8  # the last instant stands as long as so many others
 

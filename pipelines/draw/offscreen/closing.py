@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from mechanics.arrays import Array, Ints
+from pipelines.draw.catalogue import READABLE
 from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
+    FINEST_SCALE,
     LIGHT,
     PLAIN,
     Colouring,
@@ -25,9 +27,8 @@ from pipelines.draw.offscreen.parts import (
 _GAP = "#d55e00"
 _OVERLAP = "#000000"
 _BALL = 26.0  # diameter of a sign [px]
-_MOVED = ("YlGnBu", 0.9)  # colour map, and the part of it that is used
+_MOVED = ("YlGnBu", READABLE)  # colour map, and the part of it that is used
 _WIDTH = ("viridis_r", 1.0)
-_FINEST = 0.1  # shortest colour scale [mm]
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def _add_places(pyvista: Any, plotter: Any, surface: ClosingSurface) -> None:
 
 def _colouring(values: Array, label: str, palette: tuple[str, float]) -> Colouring:
     finite = values[np.isfinite(values)]
-    end, intervals = robust_ceiling(values, _FINEST)
+    end, intervals = robust_ceiling(values, FINEST_SCALE)
     saturated = bool(finite.max() > end)
     return Colouring(values, label, end, intervals, saturated, palette)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
-from pipelines.draw.catalogue import PICTURES
+from pipelines.draw.catalogue import PICTURES, READABLE
 from pipelines.draw.offscreen.jobs import run_job
 from pipelines.draw.offscreen.parts import (
     Colouring,
@@ -23,7 +23,7 @@ from pipelines.draw.offscreen.parts import (
     save_picture,
 )
 
-_PALETTE = ("YlOrRd", 0.85)  # colour map, and the part of it that is used
+_PALETTE = ("YlOrRd", READABLE)  # colour map, and the part of it that is used
 _NOTE = "As the stones begin to move, exaggerated; glass: where they stand"
 
 

@@ -9,16 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from ground.units import MILLI
 from mechanics.arrays import Array, Bools, Ints
+from survey.conventions import FINEST
 
 _INSIDE, _OUTSIDE = "#1f5f8b", "#c4302b"  # resultants within and outside the kern
 _LONGEST = 0.12  # the longest stroke of a resultant, over the wall's diagonal
-_SIZE = (1600, 1300)
+SIZE = (1600, 1300)
 _ROW, _LINES = 84, 3  # characters in a line of a title, and lines for which there is room
 _EDGE = "#3a3733"
 PLAIN, INK = "#c9c6c0", "#222222"
 LIGHT: dict[str, Any] = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
-_ROUND = {1.0: 5, 1.2: 6, 1.5: 5, 2.0: 4, 2.5: 5, 3.0: 6, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}  # end: intervals
+FINEST_SCALE = FINEST / MILLI  # shortest scale of movements and widths: less is not worth a colour [mm]
 _ROBUST = 98.0  # percentile of the values at which a colour scale ends
 _AZIMUTH = np.deg2rad(-24.0)
 OBLIQUELY = np.deg2rad(14.0)
@@ -65,11 +67,10 @@ class DrawnResultants:
 
 def nice_ceiling(value: float) -> tuple[float, int]:
     """Round a positive value up; return the round number, and the count of round intervals that divide it."""
-    decade = 10.0 ** floor(log10(value))
-    for step, intervals in _ROUND.items():
-        if value <= step * decade * (1.0 + 1e-9):
-            return step * decade, intervals
-    return 10.0 * decade, _ROUND[1.0]
+    tenth = 10.0 ** (floor(log10(value)) - 1)
+    scales = [(count * step, count) for step in (2, 3, 5, 10, 20) for count in (4, 5, 6)]
+    end, intervals = min(scale for scale in scales if scale[0] * tenth * (1.0 + 1e-9) >= value)
+    return end * tenth, intervals
 
 
 def robust_ceiling(values: Array, finest: float) -> tuple[float, int]:
@@ -80,7 +81,7 @@ def robust_ceiling(values: Array, finest: float) -> tuple[float, int]:
 
 def new_plotter(pyvista: Any) -> Any:
     """Make an empty picture, without a window."""
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(_SIZE), lighting="none")
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), lighting="none")
     plotter.set_background("white")
     return plotter
 
@@ -216,7 +217,7 @@ def place_camera(
     middle = middle + top * ((along.min() + along.max()) / 2 - middle @ top)
     width, height = np.ptp(across), np.ptp(along)
     # room above for the title and below for the scalar bar: the wall takes 74 % of the height
-    visible = max(height / 0.74, width / 0.92 * _SIZE[1] / _SIZE[0])
+    visible = max(height / 0.74, width / 0.92 * SIZE[1] / SIZE[0])
     camera = plotter.camera
     camera.parallel_projection = True
     camera.parallel_scale = visible / 2

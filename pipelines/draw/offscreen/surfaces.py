@@ -12,12 +12,12 @@ from mechanics.scene.scene import Fidelity
 from mechanics.stones.materials import Material
 from pipelines.draw.catalogue import PICTURES
 from pipelines.draw.offscreen.parts import fan_polygons
+from survey.conventions import ALIKE, FEW
 
 FIELDS = tuple(name for name, picture in PICTURES.items() if picture.shows != "joints")
 """Columns of `WallSurface.fields`."""
 
-_TOGETHER = 0.05  # part of the mean motion of the supports by which each may differ from it [-]
-_EDGE_ANGLE = np.deg2rad(20.0)  # triangles that meet at a smaller angle belong to one face
+_TOGETHER = FEW  # part of the mean motion of the supports by which each may differ from it [-]
 
 
 @dataclass(frozen=True)
@@ -151,5 +151,5 @@ def _stone_edges(body: BodyResult, triangles: Ints) -> Ints:
     order = np.lexsort((sides[:, 1], sides[:, 0]))
     sides, owner = sides[order], owner[order]
     same = np.all(sides[1:] == sides[:-1], axis=1)
-    bent = np.einsum("ij,ij->i", normals[owner[1:]], normals[owner[:-1]]) < np.cos(_EDGE_ANGLE)
+    bent = np.einsum("ij,ij->i", normals[owner[1:]], normals[owner[:-1]]) < np.cos(ALIKE)
     return np.asarray(sides[1:][same & bent], dtype=np.int64)

@@ -16,10 +16,11 @@ from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
+from survey.conventions import MOST, PER_CENT, TENTH
 
-_LATE = 0.5  # of the run, whose mean is that of large strain [-]
-_PEAK = 0.01  # vertical strain over which the largest ratio is a mean [-]
-_MASS = 0.1  # of a side platen, over that of the sample if it were water [-]
+_LATE = MOST  # of the run, whose mean is that of large strain [-]
+_PEAK = PER_CENT  # vertical strain over which the largest ratio is a mean [-]
+_MASS = TENTH  # of a side platen, over that of the sample if it were water [-]
 
 
 class SampleSides(StrEnum):

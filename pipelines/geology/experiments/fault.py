@@ -19,6 +19,7 @@ from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
+from survey.conventions import FEW, MOST, TENTH
 
 _FIRST_PHASE = 0.25  # of the paper's run, 10 of 40 s [-]
 _SLIP = "slip [m]"
@@ -26,8 +27,8 @@ _FRONT = "front ahead of the tip [m]"
 _OBSERVED = (_FRONT, "left limit [°]", "right limit [°]", "limits, θ_l [°]", "radius of the crest [m]")
 _APICAL = "trishear: apical angle [°]"
 _RATIO = "trishear: propagation to slip [-]"
-_RISEN = 0.1  # rise of the surface over that of the basement, at the front of the fold [-]
-_CREST = (0.5, 0.95)  # rise of the surface over that of the basement, between which its crest bends [-]
+_RISEN = TENTH  # rise of the surface over that of the basement, at the front of the fold [-]
+_CREST = (MOST, 1.0 - FEW)  # rise of the surface over that of the basement, between which its crest bends [-]
 _AVERAGING_LENGTH = (
     4.0  # lengths over which the surface is averaged, over the mean radius: those of two disks [-]
 )

@@ -16,8 +16,9 @@ from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
+from survey.conventions import TENTH
 
-_RISEN = 0.1  # rise of the surface over its largest rise, at the front [-]
+_RISEN = TENTH  # rise of the surface over its largest rise, at the front [-]
 _AVERAGING_LENGTH = 20.0  # lengths over which it is averaged, over the mean radius [-]
 
 

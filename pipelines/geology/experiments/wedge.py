@@ -18,14 +18,16 @@ from mechanics.scene.loads.motions import ImposedMotion
 from mechanics.scene.loads.time_series import History
 from pipelines.geology.experiments.experiment import Setup
 from pipelines.geology.observe import Fields
+from survey.conventions import MOST
 
-_MIDDLE = (0.15, 0.85)  # part of the wedge, along its base, over which its slope is measured [-]
+_END = 0.15
+_MIDDLE = (_END, 1.0 - _END)  # part of the wedge, along its base, over which its slope is measured [-]
 _BASE, _WALL = 0, 1  # numbers of the base and of the wall that pushes, after the disks
-_LATE = 0.5  # of the run, whose means are those of the forces on wall and base [-]
-_SLIDES = 0.5  # speed over that of the wall, of disks that slide over the base [-]
+_LATE = MOST  # of the run, whose means are those of the forces on wall and base [-]
+_SLIDES = MOST  # speed over that of the wall, of disks that slide over the base [-]
 _TOE = 2.0  # height of the surface over the mean radius, behind which the wedge ends [-]
 _ALONE = 9  # places of a running mean of the height, one each mean radius
-_RISEN = 2.0  # rise of the surface over the mean radius, at the front of what a push has built [-]
+_RISEN = _TOE  # rise of the surface over the mean radius, at the front of what a push has built [-]
 _ROOM = 1.5  # length of the base over that of the wedge and the push [-]
 
 

@@ -28,6 +28,7 @@ from survey.clouds.pictures.photograph import Photograph, open_photograph
 from survey.clouds.pictures.proposal import Proposal, propose_outlines
 from survey.clouds.pictures.statistics import bond_statistics
 from survey.clouds.settings import OutlineSettings
+from survey.conventions import TENTH
 
 INDEX = "outlines.json"
 """Name of the file that lists all files of the folder."""
@@ -35,7 +36,7 @@ INDEX = "outlines.json"
 PAGE = "outlines.html"
 """Name of the page that corrects the outlines."""
 
-_SURE = 0.9  # probability of a joint from which it is no doubt
+_SURE = 1.0 - TENTH  # probability of a joint from which it is no doubt
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from sqlalchemy.orm import Session
 from archmodel.store.stone_arrays import Faces
 from archmodel.tables.entities import Entity
 from archmodel.tables.runs import ContactPoint, EntityResult, JointResult
+from ground.units import MEGA
 from mechanics.arrays import Array
 from pipelines.record.export.building import Building, stable_uuid
 from pipelines.record.export.compas_contacts import (
-    MEGAPASCAL,
     POISSON,
     PairContact,
     contact_document,
@@ -135,7 +135,7 @@ def _material(building: Building, name: str) -> dict[str, Any]:
 
     def in_megapascals(label: str) -> float | None:
         """Return a property of the material [MPa]; None where not known."""
-        return material[label] / MEGAPASCAL if label in material else None
+        return material[label] / MEGA if label in material else None
 
     data = {
         "name": name,

@@ -10,9 +10,6 @@ from mechanics.arrays import Array
 from pipelines.record.export.building import stable_uuid
 from survey.geometry.solids import plane_frame
 
-MEGAPASCAL = 1e6
-"""Unit of strengths and moduli in COMPAS [Pa]."""
-
 POISSON = 0.2
 """Poisson's ratio of the materials of compas_dem [-]."""
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ground.errors import GeometryError, SceneError
 from ground.polygons import area_and_centroid
+from ground.units import MEGA
 from mechanics.arrays import Array
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -25,7 +26,7 @@ from mechanics.scene.scene import Block, ContactSettings, Fidelity, Part, Scene,
 from mechanics.scene.shapes import LIMESTONE
 from mechanics.stones.materials import Material
 from mechanics.stones.polyhedra import mass_properties
-from pipelines.record.export.compas_contacts import MEGAPASCAL, POISSON
+from pipelines.record.export.compas_contacts import POISSON
 from survey.formats.solids.bodies import RawBody, closed_bodies
 from survey.formats.solids.compas import CompasBlock, CompasModel, read_compas
 from survey.geometry.solids import Solid
@@ -141,7 +142,7 @@ def _material(block: CompasBlock, materials: Mapping[str, Mapping[str, Any]]) ->
     return Material(
         name=str(known.get("name") or "stone"),
         density=float(density or 1.0),  # that of a support has no effect
-        young=LIMESTONE.young if young is None else float(young) * MEGAPASCAL,
+        young=LIMESTONE.young if young is None else float(young) * MEGA,
         poisson=float(known.get("poisson") or POISSON),
     )
 

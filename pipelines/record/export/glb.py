@@ -5,8 +5,10 @@ centroid in float64.
 """
 
 import json
+import math
 import struct
 from collections.abc import Sequence
+from enum import IntEnum
 from importlib.metadata import version
 from typing import Any
 
@@ -15,14 +17,19 @@ from numpy.typing import NDArray
 
 from pipelines.record.export.building import Building, Value, plain_values
 
-_FLOAT, _UNSIGNED = 5126, 5125  # component types
-_VERTICES, _INDICES = 34962, 34963  # targets of views
 _ABSENT = -float(np.finfo(np.float64).max)
 """Number that stands for no value: JSON has no NaN."""
 
-_EIGHTH = 0.5**0.5  # cosine and sine of 45°
+_EIGHTH = math.sqrt(1 / 2)  # cosine and sine of 45°
 _UPWARDS = [-_EIGHTH, 0.0, 0.0, _EIGHTH]
 """Rotation that turns z, which is upwards here, to y, which is upwards in glTF."""
+
+
+class _Gl(IntEnum):
+    """Numbers of OpenGL: types of components, and targets of views."""
+
+    UNSIGNED_INT, FLOAT = 5125, 5126
+    ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 
 class _Chunks:
@@ -45,7 +52,7 @@ class _Chunks:
 
     def accessor(self, array: NDArray[Any], kind: str, target: int) -> int:
         """Add an array, and return the number of the accessor to it."""
-        component = _FLOAT if array.dtype == np.float32 else _UNSIGNED
+        component = _Gl.FLOAT if array.dtype == np.float32 else _Gl.UNSIGNED_INT
         accessor: dict[str, Any] = {
             "bufferView": self.view(array.tobytes(), target),
             "componentType": component,
@@ -63,10 +70,10 @@ def glb_content(building: Building) -> bytes:
     chunks = _Chunks()
     mesh = building.mesh
     origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    position = chunks.accessor((mesh.vertices - origin).astype("<f4"), "VEC3", _VERTICES)
+    position = chunks.accessor((mesh.vertices - origin).astype("<f4"), "VEC3", _Gl.ARRAY_BUFFER)
     # numbers of features are exact in float32 up to 16,777,216
-    feature = chunks.accessor(mesh.owner.astype("<f4"), "SCALAR", _VERTICES)
-    indices = chunks.accessor(mesh.triangles.astype("<u4").ravel(), "SCALAR", _INDICES)
+    feature = chunks.accessor(mesh.owner.astype("<f4"), "SCALAR", _Gl.ARRAY_BUFFER)
+    indices = chunks.accessor(mesh.triangles.astype("<u4").ravel(), "SCALAR", _Gl.ELEMENT_ARRAY_BUFFER)
     schema, properties = _table(building, chunks)
     count = len(building.codes)
     features = {"featureIds": [{"featureCount": count, "attribute": 0, "propertyTable": 0}]}

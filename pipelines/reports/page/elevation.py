@@ -9,13 +9,14 @@ from markupsafe import Markup, escape
 
 from mechanics.arrays import Array, Ints
 from pipelines.reports.page.model import Model
+from survey.conventions import SOME
 
 _WIDE, _HIGH = 170.0, 200.0  # room on a sheet of A4, portrait [mm]
-_SCALES = (5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000)
-_FRONT = 0.25  # cosine to the observer from which a face is drawn [-]
+_ROUND = (1, 2, 5)
+_SCALES = [scale * 10**power for power in range(4) for scale in (5, 10, 20, 25)]
+_FRONT = SOME  # cosine to the observer from which a face is drawn [-]
 _LETTER = 2.0  # height of a code [mm]
 _BROAD = 0.62  # width of a letter over its height [-]
-_BAR = (1, 2, 5)
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def _bar(scale: int, below: float, wide: float) -> str:
         (
             digit * 10.0**power
             for power in range(-2, 4)
-            for digit in _BAR
+            for digit in _ROUND
             if digit * 10.0**power * 1e3 / scale < wide / 3
         ),
         default=0.01,

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechanics.arrays import Array, Bools, Ints
+from survey.arrays import AXES
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,6 @@ class Model:
     events: Sequence[Event] = ()
     colour: str | None = None
     towards: Array = field(default_factory=lambda: np.array([0.0, -1.0, 0.0]))
-    origin: Array = field(default_factory=lambda: np.zeros(3))
+    origin: Array = field(default_factory=lambda: np.zeros(AXES))
     axes: tuple[str, str, str] = ("x", "y", "z")
     notes: Sequence[str] = ()

@@ -17,10 +17,11 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.reports.page.model import Column, Joints, Mechanism, Model, Motion
+from survey.conventions import FINEST, THINNEST
 
 _LEVEL = 6  # of gzip
-_FINE, _COARSE = 1e-5, 1e-4  # steps of corners, and of measured points and corners of joints [m]
-_STEPS = 32767  # of an int16
+_FINE, _COARSE = THINNEST, FINEST  # steps of corners, and of measured points and corners of joints [m]
+_STEPS = int(np.iinfo(np.int16).max)
 _NAMES = {"float32": "f4", "int16": "i2", "int32": "i4", "uint8": "u1"}
 
 

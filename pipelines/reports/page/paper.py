@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 
 from ground.errors import MomaError, UsageError
 
-NO_SUM = "0" * 64
+NO_SUM = "0" * len(hashlib.sha256().hexdigest())
 """Stands in a page where its checksum will."""
 
 _SUM = re.compile(r'(<code class="checksum">)([0-9a-f]{64})(</code>)')

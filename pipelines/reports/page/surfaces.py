@@ -6,6 +6,7 @@ import numpy as np
 
 from mechanics.arrays import Array, Bools, Ints
 from pipelines.reports.page.model import Stones
+from survey.conventions import ALIKE
 from survey.geometry.solids import Solid
 from survey.geometry.watertight import triangulate
 
@@ -13,7 +14,7 @@ Faces = Sequence[Sequence[int]]
 Shape = tuple[Array, Faces]
 """Points (n, 3) of one stone [m], and its faces, counter-clockwise seen from outside."""
 
-_CREASE = np.cos(np.radians(20.0))  # of the angle between facets from which their edge is drawn [-]
+_CREASE = np.cos(ALIKE)  # of the angle between facets from which their edge is drawn [-]
 
 
 def stones_of(

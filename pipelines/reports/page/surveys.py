@@ -5,17 +5,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mechanics.arrays import Array
+from pipelines.draw.elevations.beds import LARGEST
 from pipelines.reports.page.model import Column, Lines, Model, Motion
 from pipelines.reports.page.surfaces import Shape, rigid_motion, stones_of
+from survey.conventions import JOINT, WIDEST_JOINT
 from survey.quality.movement import CourseMovement
 from survey.quality.precision import StoneQuality
 
 Displacement = Callable[[str, Array], Array]
 """Displacement (n, 3) of points (n, 3) of the stone of a code [m]."""
 
-_THIN = 0.05  # drawn depth of stones whose depth is not known [m]
-_LARGEST = 0.45  # the largest deviation of a bed as drawn, over the distance between courses [-]
-_BEFORE = 0.01  # distance of the lines before the wall [m]
+_THIN = WIDEST_JOINT  # drawn depth of stones whose depth is not known [m]
+_BEFORE = JOINT  # distance of the lines before the wall [m]
 _ORANGE, _BLUE = "#d55e00", "#0072b2"
 
 
@@ -73,7 +74,7 @@ def bed_lines(courses: Sequence[CourseMovement], normals: dict[str, Array]) -> l
         np.abs(course.line.height - level).max() for course, level in zip(courses, levels, strict=True)
     ]
     largest = max(max(departures), max(float(np.abs(own).max()) for own in simulated), 1e-6)
-    factor = max(1.0, float(f"{_LARGEST * room / largest:.1g}"))
+    factor = max(1.0, float(f"{LARGEST * room / largest:.1g}"))
     polylines: dict[str, list[Array]] = {"measured": [], "simulated": []}
     for course, level, own in zip(courses, levels, simulated, strict=True):
         places = course.line.places + _BEFORE * normals.get(course.line.facade, np.zeros(3))

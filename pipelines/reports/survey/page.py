@@ -6,14 +6,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import Table, picture, table_of, write_page
+from pipelines.reports.html import MAX_ROWS, Table, picture, table_of, write_page
 from pipelines.reports.page.model import Column
 from pipelines.reports.page.surveys import survey_model
 from pipelines.reports.survey.campaigns import MovedStone, comparison_lines
 from pipelines.reports.survey.document import finding_of
 from pipelines.reports.survey.study import SurveyFile, SurveyStudy
+from survey.conventions import SIGNIFICANT
 from survey.quality.canon import Deviation, KindStandard
-from survey.quality.contradictions import SIGNIFICANT, Contradiction
+from survey.quality.contradictions import Contradiction
 from survey.quality.courses import CourseHeight, CourseLine
 from survey.quality.departures.beds import OddBed, WallBeds
 from survey.quality.departures.depths import DoubtfulDepth
@@ -22,8 +23,6 @@ from survey.quality.masonry.index import PARAMETERS, Direction, Parameter
 from survey.quality.masonry.walls import MasonryQuality
 from survey.quality.precision import StoneQuality
 from survey.quality.remeasure import Remeasure
-
-_MAX_ROWS = 300  # rows of a table; survey.json has them all
 
 Row = dict[str, str]
 
@@ -64,8 +63,8 @@ def write_survey_page(
         left=study.again.left,
         movements=table_of("beds", list(_movements(study)), dict),
         faces=table_of("faces", list(_faces(study)), dict),
-        odd=table_of("odd", _odd(study), dict, _MAX_ROWS),
-        depths=table_of("depths", study.depths, _doubt_row, _MAX_ROWS),
+        odd=table_of("odd", _odd(study), dict, MAX_ROWS),
+        depths=table_of("depths", study.depths, _doubt_row, MAX_ROWS),
         masonry=list(_masonry(study)),
         quality=_overall(study),
         control=list(_control(study.files)),
@@ -73,11 +72,11 @@ def write_survey_page(
         kinds=table_of("kinds", list(study.usual.values()), partial(_kind_row, study)),
         since=None if study.since is None else list(comparison_lines(study.since)),
         displacements=table_of(
-            "since", () if study.since is None else study.since.stones, _moved_row, _MAX_ROWS
+            "since", () if study.since is None else study.since.stones, _moved_row, MAX_ROWS
         ),
         photographs=photographs,
-        located=table_of("evidence", list(_located(study)), dict, _MAX_ROWS),
-        contradictions=table_of("contradictions", study.contradictions, _contradiction_row, _MAX_ROWS),
+        located=table_of("evidence", list(_located(study)), dict, MAX_ROWS),
+        contradictions=table_of("contradictions", study.contradictions, _contradiction_row, MAX_ROWS),
         stones=_stones(study, facade_of),
         version=version,
     )
@@ -316,7 +315,7 @@ def _courses(study: SurveyStudy) -> Iterator[dict[str, Any]]:
             "name": facade,
             "tilt": f"{tilted * 1e3:.2f}" if tilted else None,
             "lines": table_of(
-                "courses", lines, lambda line: _course_row(line, heights, study.beds), _MAX_ROWS
+                "courses", lines, lambda line: _course_row(line, heights, study.beds), MAX_ROWS
             ),
         }
 
@@ -347,7 +346,7 @@ def _kind_row(study: SurveyStudy, kind: KindStandard) -> Row:
     odd.sort(key=lambda stone: -stone.worst)
     named = (
         f"{stone.code} ({stone.length * 1e3:+z.0f} mm long, {stone.height * 1e3:+z.0f} mm high)"
-        for stone in odd[:_MAX_ROWS]
+        for stone in odd[:MAX_ROWS]
     )
     return {
         "kind": kind.kind,
@@ -375,7 +374,7 @@ def _stones(study: SurveyStudy, facade_of: Mapping[int, str]) -> Table:
         stone = study.stones[i]
         return _stone_row(stone, facade_of.get(i, "–"), deviation_of.get(stone.code))
 
-    return table_of("stones", _by_urgency(study), cells, _MAX_ROWS)
+    return table_of("stones", _by_urgency(study), cells, MAX_ROWS)
 
 
 def _stone_row(stone: StoneQuality, facade: str, off: Deviation | None) -> Row:

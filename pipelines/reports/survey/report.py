@@ -21,6 +21,7 @@ from pipelines.reports.survey.page import write_survey_page
 from pipelines.reports.survey.study import SurveyStudy, study_surveys
 from pipelines.results.folder import check_replaceable, replacing, source_of
 from survey.clouds.settings import CloudOptions
+from survey.conventions import LARGEST
 from survey.formats.options import ReadingOptions
 from survey.orientation.formats.result import read_orientation
 from survey.orientation.network import listed
@@ -28,8 +29,6 @@ from survey.quality.masonry.index import Grade
 
 INDEX = "survey.json"
 """Name of the file that lists all files of a report."""
-
-_FACADES = 8  # number of facades drawn, the largest first
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ def _draw(study: SurveyStudy, folder: Path, photo: Orthophoto | None) -> dict[st
     """Draw the pictures; return captions by file name. Those of the first facade have no number."""
     captions = {}
     flagged = {row.code for row in study.again.rows if row.code is not None}
-    for number, facade in enumerate(study.facades[:_FACADES], start=1):
+    for number, facade in enumerate(study.facades[:LARGEST], start=1):
         ending = ".png" if number == 1 else f"-{number}.png"
         name = f"elevation{ending}"
         under = photo if photo is not None and photo.shows(facade) else None

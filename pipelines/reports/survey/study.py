@@ -14,6 +14,7 @@ from mechanics.dynamics.progress import Listener, Progress, silent
 from pipelines.ingest.outlined import open_source
 from pipelines.ingest.reading_options import Source, survey_sources
 from pipelines.reports.survey.campaigns import CampaignComparison, compare_campaigns
+from survey.conventions import RARE, STONE
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.options import ReadingOptions
 from survey.quality.canon import Deviation, KindStandard, deviations, standards
@@ -27,17 +28,17 @@ from survey.quality.departures.faces import WallFace, find_face_departures
 from survey.quality.facades import Facade, facades_of
 from survey.quality.masonry.index import Grade
 from survey.quality.masonry.walls import MasonryQuality, WallStone, judge_masonry
-from survey.quality.plausible import LENGTH, doubt_of
 from survey.quality.precision import StoneQuality, SurveyQuality, appraise, judge_survey
 from survey.quality.remeasure import Remeasure, ShortList, list_remeasures, short_list
+from survey.records.plausible import LENGTH, doubt_of
 from survey.records.survey import Canon, DepthRule, Reject, SurveyHead
 from survey.registration.site_frame import SiteTransform
 from survey.registration.stones import survey_stones
 
-CHANCES = {"beds": BED_CHANCE, "faces": 0.003, "depths": 0.001}
+CHANCES = {"beds": BED_CHANCE, "faces": BED_CHANCE, "depths": RARE}
 """Probability that a survey without fault or movement is given a finding of each sort."""
 
-_SOME_DEPTH = DepthRule(None, 0.3, None, "\0")  # no file can give this source
+_SOME_DEPTH = DepthRule(None, STONE, None, "\0")  # no file can give this source
 _OF_PATCHES = "the sigma of each patch follows from the scatter of all, so that the scatter cannot check it"
 _INTERVAL = 200  # stones between two reports of progress
 

@@ -6,24 +6,22 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-FINE, FEW, COVERED, STEEP = 0, 1, 2, 3  # status of `fit_patches`
+from survey.conventions import CHECKED, ENOUGH, MOST, ROUNDS, SAMPLE, STEEPEST, TRIALS, TUKEY
 
-_TRIPLES = 300  # planes that are tried: three patches of a face half covered are clear in one of eight
-_STEEPEST = math.tan(
-    math.radians(60.0)
-)  # slope against the line of sight beyond which nobody outlines a face
-_FEWEST_POINTS = 4  # points from which a patch has a height
-_FEWEST_PATCHES = 5  # patches from which a plane has a scatter
-_CLEAR = 0.5  # share of a patch's points near the plane below which something covers it
-_ROUNDS = 3  # of refinement; the plane then moves by less than a tenth of its standard deviation
+FINE, FEW, COVERED, STEEP = range(4)  # status of `fit_patches`
+
+_TRIPLES = TRIALS  # planes that are tried: three patches of a face half covered are clear in one of eight
+_STEEPEST = math.tan(STEEPEST)  # slope against the line of sight beyond which nobody outlines a face
+_FEWEST_POINTS = CHECKED  # points from which a patch has a height
+_FEWEST_PATCHES = ENOUGH  # patches from which a plane has a scatter
+_CLEAR = MOST  # share of a patch's points near the plane below which something covers it
 _TAILS = (
     6.0  # three standard deviations hold 99.7 % although the variance is estimated: t² ≈ 9 (1 + 6 / freedom)
 )
-_CURVED = 14  # patches from which a curved surface is told from scatter
+_CURVED = SAMPLE  # patches from which a curved surface is told from scatter
 _BENT = (
     1.6  # variance about a plane over that about a curved surface beyond which a face is curved: one in 1,000
 )
-_TUKEY = 4.685  # scale beyond which a patch has no weight: 95 % efficiency if the scatter is normal
 
 
 class Rules(NamedTuple):
@@ -105,7 +103,7 @@ def _best_plane(points, patch, filled, near):
 @njit(cache=True, nogil=True)
 def _refined(points, patch, filled, plane, near):
     """Fit the plane again to the points near it, each patch with the same weight."""
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         rows, weights = np.ones((len(points), 3)), np.zeros(len(points))
         for k in range(len(points)):
             rows[k, 0], rows[k, 1] = points[k, 0], points[k, 1]
@@ -185,7 +183,7 @@ def _scatter(places, heights, curved):
     for _ in range(8):
         scale = max(1.4826 * np.median(np.abs(residuals)), 1e-9)
         for k in range(count):
-            reduced = residuals[k] / (_TUKEY * scale)
+            reduced = residuals[k] / (TUKEY * scale)
             weights[k] = (1.0 - reduced * reduced) ** 2 if abs(reduced) < 1.0 else 1e-9
         residuals = heights - rows @ _least_squares(rows, heights, weights)
     scale = max(1.4826 * np.median(np.abs(residuals)), 1e-9)

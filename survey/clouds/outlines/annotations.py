@@ -16,12 +16,11 @@ from ground.errors import SurveyError, UsageError
 from survey.arrays import Array
 from survey.clouds.outlines.classes import class_of_stones
 from survey.clouds.outlines.outline import Attributes, Outline, attributes_of, made_code
-from survey.clouds.outlines.tracing import few_corners
+from survey.clouds.outlines.tracing import DENSE, few_corners
 from survey.clouds.world import PixelPlace, world_of
 from survey.formats.tables.kinds import KINDS, kind_of
 
 _ARC = 32  # corners of a circle or an ellipse, which are then described by fewer
-_DENSE = 12  # corners beyond which an outline was drawn as a curve
 _REMEDY = "draw each stone as a polygon, or export COCO"
 
 
@@ -129,7 +128,7 @@ def _outlines(
             attributes = replace(attributes, code=code, kind=kind, notes=notes)
         # both count from the corner of the first pixel, not from its middle
         ring = one.ring - 0.5
-        corners = few_corners(ring, tolerance) if len(ring) > _DENSE else ring
+        corners = few_corners(ring, tolerance) if len(ring) > DENSE else ring
         yield Outline(number, f"S{int(code):03d}" if code.isdigit() else code, corners, attributes, one.where)
 
 

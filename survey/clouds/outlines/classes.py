@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import CHECKED, GROUP, MOST, NEGLIGIBLE, TENTH
 from survey.formats.tables.kinds import KINDS, kind_of
 
-_PIECES = 4  # pieces of one number, of which none has half of its area, that make it a class
-_HALF = 0.5  # share of an area that is most of it [-]
-_MIN_PIECES = 3  # pieces of black that stones in black have at least
-_SMALLEST = 12  # pixels of the smallest piece that can be a stone
+_PIECES = CHECKED  # pieces of one number, of which none has half of its area, that make it a class
+_MIN_PIECES = GROUP  # pieces of black that stones in black have at least
+SMALLEST = 12  # pixels of the smallest piece that can be a stone
 _BRIDGE = 2.0  # pixels: half of the widest bridge that a slip of the brush makes
-_SLENDER = 0.02  # of the side of a stone: half the width of a neck that is questioned
-_MIN_PIECE_SHARE = 0.1  # least share of a stone's area in each of the parts that hang together by a neck [-]
+_SLENDER = NEGLIGIBLE  # of the side of a stone: half the width of a neck that is questioned
+_MIN_PIECE_SHARE = (
+    TENTH  # least share of a stone's area in each of the parts that hang together by a neck [-]
+)
 _EXPORT = "export it as it is, in its own size and without smoothing, e.g. as PNG"
 
 
@@ -110,8 +112,8 @@ def check_stones(numbers: NDArray[np.int32], values: Ints, colours: bool, path: 
         if box is None:
             continue
         sizes = np.bincount(label(numbers[box] == number)[0].ravel())[1:]
-        pieces = int(np.count_nonzero(sizes >= _SMALLEST))
-        if pieces >= _PIECES and sizes.max() < _HALF * sizes.sum():
+        pieces = int(np.count_nonzero(sizes >= SMALLEST))
+        if pieces >= _PIECES and sizes.max() < MOST * sizes.sum():
             classes[_named(int(values[number]), colours)] = pieces
     if classes:
         most = max(classes, key=lambda class_: classes[class_])
@@ -136,12 +138,12 @@ def refuse_mortar(white: Bools, path: Path) -> None:
     from scipy.ndimage import distance_transform_edt, label
     from scipy.ndimage import maximum as largest_of
 
-    if _largest(label(white)[0]) <= _HALF * np.count_nonzero(white):
+    if _largest(label(white)[0]) <= MOST * np.count_nonzero(white):
         return
     pieces = label(~white)[0]
     sizes = np.bincount(pieces.ravel())[1:]
-    large = np.flatnonzero(sizes >= _SMALLEST) + 1
-    if len(large) < _MIN_PIECES or sizes.max() > _HALF * sizes.sum():
+    large = np.flatnonzero(sizes >= SMALLEST) + 1
+    if len(large) < _MIN_PIECES or sizes.max() > MOST * sizes.sum():
         return
     widths = 2.0 * np.asarray(largest_of(distance_transform_edt(~white), pieces, large))
     if np.median(widths - _gaps(pieces)[large]) > 0.0:

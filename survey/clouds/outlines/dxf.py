@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from ground.errors import SurveyError
-from ground.tables.columns import UNITS
+from ground.units import LENGTHS
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.dxf_entities import Curve, DrawnText, Entities, entities_of
 from survey.clouds.outlines.outline import Outline, attributes_of, made_code
+from survey.conventions import GROUP, LISTED
 from survey.formats.tables.kinds import KINDS, kind_of
 from survey.geometry.polygons import inside
 from survey.geometry.solids import area_vector
@@ -29,8 +30,7 @@ _UNITS = {
     "USSurveyFeet": "us-ft",
 }
 """Units of length by their names in ezdxf."""
-_LISTED = 6  # labels in a message
-_FRAMED = 3  # texts of other outlines within an outline that is no stone
+_FRAMED = GROUP  # texts of other outlines within an outline that is no stone
 
 
 def read_dxf(
@@ -88,7 +88,7 @@ def _stated_unit(drawing: Any, path: Path) -> float:
             where=str(path),
             remedy="state the unit of its lengths, e.g. --unit m",
         )
-    return UNITS[_UNITS[name]] if code else 1.0
+    return LENGTHS[_UNITS[name]] if code else 1.0
 
 
 def _opened(path: Path, layer: str | None) -> tuple[Any, Entities]:
@@ -156,7 +156,7 @@ def _astray(
     inside = {id(text) for some in labels.values() for text in some}
     outside = [next(iter(text.values.values())) for text in texts if text.values and id(text) not in inside]
     if outside:
-        yield "texts", f"{len(outside)} labels stand in no outline: {', '.join(outside[:_LISTED])}"
+        yield "texts", f"{len(outside)} labels stand in no outline: {', '.join(outside[:LISTED])}"
     if unnamed:
         yield "left out", f"{unnamed} closed curves of single lines, without a text of their own"
 

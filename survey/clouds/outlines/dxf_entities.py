@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
+from survey.conventions import LEAST, NEGLIGIBLE
 
 _CLOSE = 0.002  # distance of the ends of a curve that counts as closed, of its longest side
-_SAGITTA = 0.001  # by which arcs may differ from their chords [drawing units]
+_SAGITTA = LEAST  # by which arcs may differ from their chords [drawing units]
 _DEEPEST = 16  # blocks within blocks
 _CURVES = ("LWPOLYLINE", "POLYLINE", "SPLINE", "CIRCLE", "ELLIPSE")
 _PIECES = (*_CURVES, "LINE", "ARC")
 _SILENT = ("POINT", "ATTDEF", "VIEWPORT", "XLINE", "RAY")  # of which nobody makes a stone
-_BACKWARD = 2  # bit of the flag of a text that is written from right to left (DXF, group 71)
-_SAME_BOX = 0.02  # difference of two boxes that are of one stone, of their size
+_SAME_BOX = NEGLIGIBLE  # difference of two boxes that are of one stone, of their size
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _text(entity: Any) -> DrawnText:
         behind = entity.dxf.extrusion.z < 0.0
         lines = (" ".join(line.split()) for line in entity.plain_text(split=True))
         return DrawnText((_vector(entity.dxf.insert),), tuple(filter(None, lines)), mirrored=behind)
-    mirrored = bool(entity.dxf.text_generation_flag & _BACKWARD) != (entity.dxf.extrusion.z < 0.0)
+    mirrored = entity.is_backward != (entity.dxf.extrusion.z < 0.0)
     line = " ".join(entity.dxf.text.split())
     return DrawnText((_place(entity),), (line,) if line else (), mirrored=mirrored)
 

@@ -10,21 +10,20 @@ from numpy.typing import NDArray
 
 from ground.errors import SurveyError
 from survey.arrays import Array
-from survey.clouds.outlines.classes import check_stones, neck, of_class, refuse_mortar
+from survey.clouds.outlines.classes import SMALLEST, check_stones, neck, of_class, refuse_mortar
 from survey.clouds.outlines.outline import Attributes, Outline
 from survey.clouds.outlines.tracing import few_corners, trace
 from survey.clouds.world import PixelPlace, world_of
+from survey.conventions import FEW, LISTED, MOST, NEGLIGIBLE
 from survey.geometry.polygons import ring_area
 
-_LARGEST = 2**24  # number of a stone: as many as there are colours
-_GREY = 0.02  # share of pixels that are neither black nor white, and not between both, in a picture of two colours
+_LARGEST = 1 << 24  # number of a stone: as many as there are colours
+_GREY = NEGLIGIBLE  # share of pixels neither black, white nor between both, in a picture of two colours
 _RIM = 5  # pixels of the square in which the smoothed edge between black and white has both
 _DARK, _WHITE = 32, 223  # of 255
-_SPECK = 0.02  # area of a piece over the median of all below which it is a speck, not a stone [-]
-_SMALLEST = 12  # pixels of the smallest piece that can be a stone
-_WALL_SHARE = 0.5  # share of a picture above which a piece is rather the wall than a stone
-_FEW_COLOURS = 8  # of a picture of classes, that a message lists
-_WHOLE = 0.95  # share of the largest piece above which the others are specks
+_SPECK = NEGLIGIBLE  # area of a piece over the median of all below which it is a speck, not a stone [-]
+_WALL_SHARE = MOST  # share of a picture above which a piece is rather the wall than a stone
+_WHOLE = 1.0 - FEW  # share of the largest piece above which the others are specks
 
 
 @dataclass(frozen=True)
@@ -85,14 +84,12 @@ def read_labels(path: Path, stones: str | None = None) -> Labels:
     flat = _colour_numbers(pixels) if colours else pixels
     values, numbers = _ranked(flat, path)
     if len(values) < 2 or values[0] != 0:
-        listed = ", ".join(
-            f"#{value:06x}" if colours else str(value) for value in values[:_FEW_COLOURS].tolist()
-        )
-        few = len(values) <= _FEW_COLOURS
+        listed = ", ".join(f"#{value:06x}" if colours else str(value) for value in values[:LISTED].tolist())
+        few = len(values) <= LISTED
         remedy = f"{_REMEDY}; or name that of the stones with --layer: {listed}" if few else _REMEDY
         raise SurveyError(f"{len(values)} numbers and no 0 among them", where=str(path), remedy=remedy)
     check_stones(numbers, values, colours, path)
-    return Labels(path, numbers, None if colours else values, 0, _SMALLEST, places)
+    return Labels(path, numbers, None if colours else values, 0, SMALLEST, places)
 
 
 _REMEDY = "a picture of labels has stones in white and mortar in black, or one number for each stone and 0 for mortar"
@@ -116,7 +113,7 @@ def outlines_of(labels: Labels, tolerance: float) -> Iterator[Outline]:
         if box is None:
             continue
         mask = labels.numbers[box] == number
-        if np.count_nonzero(mask) < _SMALLEST:
+        if np.count_nonzero(mask) < SMALLEST:
             continue
         value = number if labels.values is None else int(labels.values[number])
         where = f"{labels.path}, label {value}"
@@ -219,9 +216,9 @@ def _pieces(white: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int, int]:
     numbers, count = label(white)
     sizes = np.bincount(numbers.ravel(), minlength=count + 1)
     sizes[0] = 0
-    fine, smallest = sizes >= _SMALLEST, _SMALLEST
+    fine, smallest = sizes >= SMALLEST, SMALLEST
     if fine.any():
-        smallest = max(_SMALLEST, int(np.ceil(_SPECK * float(np.median(sizes[fine])))))
+        smallest = max(SMALLEST, int(np.ceil(_SPECK * float(np.median(sizes[fine])))))
         fine &= sizes >= smallest
     boxes = find_objects(numbers)
     good = np.flatnonzero(fine)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ground.errors import SurveyError, UsageError
+from ground.tables.numbers import FARTHEST
 from survey.arrays import Array
 from survey.clouds.outlines.annotations import is_annotated, read_annotations
 from survey.clouds.outlines.coco import is_coco, load_json, read_coco
@@ -14,9 +15,10 @@ from survey.clouds.outlines.dxf import read_dxf
 from survey.clouds.outlines.labels import outlines_of, read_labels
 from survey.clouds.outlines.outline import Outline, WrongOutline, joined_names
 from survey.clouds.outlines.plain import is_plain, read_plain_json, read_table
-from survey.clouds.outlines.tracing import few_corners
+from survey.clouds.outlines.tracing import DENSE, few_corners
 from survey.clouds.outlines.vector import read_vector, read_wkt_table, wkt_table
 from survey.clouds.world import PixelPlace
+from survey.conventions import NOTICEABLE
 from survey.formats.fields import KIND, NUMBERED_ANEW
 from survey.formats.tables.kinds import kind_of
 
@@ -27,9 +29,9 @@ _VECTORS = (".gpkg", ".geojson", ".json", ".shp", ".fgb", ".kml", ".gml", ".sqli
 _TABLES = (".csv", ".txt", ".xlsx", ".ods", ".xls")
 _OF_FORMATS = ("layer", "label", "category")  # notes that readers make themselves
 _LONGEST = 200  # characters of names in a remark
-_DENSE = 12  # corners beyond which an outline was traced or drawn as a curve, and is described by fewer
-_LIKELY = 2.0  # standard deviations of a drawn corner that a curve may differ from its sides
-_FARTHEST = 1e8  # largest coordinate [m]
+DRAWN = 0.005  # standard deviation of a drawn corner, where an outline states none [m]
+SMOOTH = 1.5  # largest distance of the boundary of a mask from the sides of its outline [px]
+_LIKELY = NOTICEABLE  # standard deviations of a drawn corner that a curve may differ from its sides
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,8 @@ def read_outlines(
     *,
     layer: str | None = None,
     chosen: Mapping[str, str] | None = None,
-    sigma: float = 0.005,
-    smooth: float = 1.5,
+    sigma: float = DRAWN,
+    smooth: float = SMOOTH,
     unit: float | None = None,
     kinds: Mapping[str, str] | None = None,
     keep_going: bool = False,
@@ -228,7 +230,7 @@ def _placed(
 def _sparse(outline: Outline, tolerance: float) -> Outline:
     """Describe an outline of many corners by few."""
     corners = outline.corners
-    if len(corners) <= _DENSE or corners.shape[1] != 2:
+    if len(corners) <= DENSE or corners.shape[1] != 2:
         return outline
     return replace(outline, corners=few_corners(_dense(corners, tolerance), tolerance))
 
@@ -246,7 +248,7 @@ def _check(outline: Outline) -> None:
     corners = outline.corners
     if len(corners) < 3:
         raise SurveyError(f"{len(corners)} corners", where=outline.where, remedy="an outline has 3 or more")
-    if not np.isfinite(corners).all() or np.abs(corners).max() > _FARTHEST:
+    if not np.isfinite(corners).all() or np.abs(corners).max() > FARTHEST:
         raise SurveyError(
             "a coordinate is not finite, or too large", where=outline.where, remedy="draw it again"
         )

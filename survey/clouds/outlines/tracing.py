@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools
+from survey.conventions import CORNERS, PARALLEL
 from survey.geometry.polygons import ring_area
 
-_SHARP = math.sin(
-    math.radians(12.0)
-)  # sine of the angle between sides below which they do not meet in a corner
+_SHARP = math.sin(PARALLEL)  # sine of the angle between sides below which they do not meet in a corner
+DENSE = 12  # corners beyond which an outline was traced or drawn as a curve, and is described by fewer
 _SPAN = 0.15  # part of a side at either end that rounds its corners off, and does not count for its line
-_MIN_CORNERS = 3  # corners of an outline
 
 
 def trace(mask: Bools) -> tuple[Array, int, float]:
@@ -65,11 +64,11 @@ def few_corners(ring: Array, tolerance: float) -> Array:
     -------
     (m, 2) m ≥ 3, whose sides do not cross; the ring itself if it has three corners or fewer, or winds too closely
     """
-    if len(ring) <= _MIN_CORNERS:
+    if len(ring) <= CORNERS:
         return ring
     for finer in (1.0, 0.5, 0.25):
         douglas_peucker = _douglas_peucker(ring, finer * tolerance)
-        if len(douglas_peucker) < _MIN_CORNERS:
+        if len(douglas_peucker) < CORNERS:
             return ring[_extreme(ring)]
         for corners in (_met(ring, douglas_peucker, tolerance), ring[douglas_peucker]):
             if not _crosses(corners):
@@ -112,7 +111,7 @@ def _extreme(ring: Array) -> NDArray[np.intp]:
         int(np.argmin(ring[:, 1])),
         int(np.argmax(ring[:, 1])),
     }
-    return np.array(sorted(extremes) if len(extremes) >= _MIN_CORNERS else range(len(ring)))
+    return np.array(sorted(extremes) if len(extremes) >= CORNERS else range(len(ring)))
 
 
 def _douglas_peucker(ring: Array, tolerance: float) -> list[int]:

@@ -12,11 +12,13 @@ from ground.tables.table import Table, read_table
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.outlines.outline import Attributes, Outline, WrongOutline, attributes_of, made_code
+from survey.conventions import LEAST, NEGLIGIBLE
 from survey.formats.tables.wkt import is_wkt
+from survey.records.plausible import LENGTH
 
-_DEGREES = 1e-3  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
-_PIXELS = 30.0  # width of the usual outline from which it is of pixels: no stone is 30 m wide
-_SMALL = 0.02  # share of the area of the largest part up to which other parts are specks [-]
+_DEGREES = LEAST  # extent of the largest outline below which coordinates are degrees: no stone is 1 mm wide
+_PIXELS = LENGTH.possible[1]  # width of the usual outline from which it is of pixels: no stone is 30 m wide
+_SMALL = NEGLIGIBLE  # share of the area of the largest part up to which other parts are specks [-]
 
 
 def read_vector(

@@ -21,6 +21,7 @@ from scipy.special import expit
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.joints import STRONGEST, WIDTH, Strength
 from survey.clouds.pictures.regions import borders_of
+from survey.conventions import SOME
 
 FEATURES = ("constant", "strength", "gaps", "fuller", "askew", "size", "step")
 """Names of what the probability depends on."""
@@ -34,7 +35,7 @@ WEIGHTS: Mapping[str, tuple[float, ...]] = MappingProxyType(
 """Weights by the kind of masonry, of missing joints, and of all borders that stay, that
 `python -m benchmarks.outlines --fit` fits."""
 
-GAP = 0.25
+GAP = SOME
 """Strength over that of a usual joint below which there is none."""
 
 LIKELY = 0.6

@@ -6,15 +6,16 @@ from numpy.typing import NDArray
 from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import ROUNDED, WIDTH, Field
+from survey.conventions import SOME, WEAR
 
 _DARK = 0.40  # lightness over that of the wall below which it is an opening: the darkest shade leaves more than half
 _BLACK = 16.0  # L* + 16 is in proportion to the cube root of the luminance (CIE 1976)
 _BEHIND = 0.12  # distance of an opening behind the faces [m], more than joints are deep
 _BEFORE = (
-    0.035  # distance before the faces of what is no stone [m], more than bosses of plain ashlar stand out
+    WEAR  # distance before the faces of what is no stone [m], more than bosses of plain ashlar stand out
 )
 _GREEN = 11.0  # by which leaves are greener than the wall [units of a*]: 2.3 are just seen
-_DENSE = 0.3  # part of the pixels before the wall from which it is hidden
+_DENSE = SOME  # part of the pixels before the wall from which it is hidden
 _LEAST = 8.0  # width of an opening over that of a joint
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ground.statistics.scale import CONSISTENT
 from survey.arrays import Bools, Ints
 from survey.clouds._kernels.lines import contrasts, keep_strongest, line_means, side_steps
+from survey.conventions import MOST
 
 WIDTH = 3.0
 """Width of a joint at the resolution of the work [px]."""
@@ -40,7 +41,7 @@ _LONG = _SPARSE * _SHORT  # along one of 33 pixels, of means along short lines
 _BRIDGE = np.arange(-64, 65, 8)  # and of 129 pixels, as far as joints go on behind what hides them
 _NO_STEP, _STEP = 2.0, 5.0  # steps of colour that texture makes, and that two stones make [grains]
 _SUREST_STEP = (
-    0.5  # evidence of a step at most, over that of a usual joint: both edges of mortar are steps too
+    MOST  # evidence of a step at most, over that of a usual joint: both edges of mortar are steps too
 )
 _REACHES = (
     3,

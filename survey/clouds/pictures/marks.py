@@ -9,11 +9,12 @@ import numpy as np
 from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.pictures.proposal import Proposal
+from survey.conventions import FEW, LARGELY, SOME
 
-_STONE_SHARE = 0.25  # part of a proposed stone within an outline from which the outline holds it
+_STONE_SHARE = SOME  # part of a proposed stone within an outline from which the outline holds it
 _SHARE_WITHIN_STONE = 0.6  # part of an outline within a proposed stone from which it lies in it
-_OVERLAP = 0.05  # shared part of the smaller of two outlines from which they overlap
-_SURE = 0.7  # probability of a joint from which it parts stones
+_OVERLAP = FEW  # shared part of the smaller of two outlines from which they overlap
+_SURE = LARGELY  # probability of a joint from which it parts stones
 
 
 @dataclass(frozen=True)

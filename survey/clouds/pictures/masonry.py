@@ -1,23 +1,25 @@
 """Courses, kinds and codes of outlined stones, by the rules of masonry."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import GROUP, MOST, PARALLEL, SLOPED, SOME
 
 _HEADER = 1.5  # length over height below which a stone of a course shows its head
-_SHARED = 0.5  # part of the lesser height that two neighbours of one course share
-_NEAR = 0.25  # distance between neighbours of a course, over their height
-_LEANS = 3.5  # angle of a side from upright from which it is radial [degrees]
-_STEEP = 12.0  # and from which it is the skewback of an arch, beside it
+_SHARED = MOST  # part of the lesser height that two neighbours of one course share
+_NEAR = SOME  # distance between neighbours of a course, over their height
+_LEANS = math.degrees(SLOPED)  # angle of a side from upright from which it is radial [degrees]
+_STEEP = math.degrees(PARALLEL)  # and from which it is the skewback of an arch, beside it
 _TOUCHES = (
-    0.20  # distance from an opening or a corner, over the height of a stone, up to which a stone bounds it
+    0.2  # distance from an opening or a corner, over the height of a stone, up to which a stone bounds it
 )
-_EDGE = 0.35  # part of the height of an opening, of its top, in which its arch or lintel lies
-_FEWEST = 3  # stones of an arch, and courses that end flush at a corner
-_BESIDE = 0.5  # part of a stone's height that lies beside an opening, for a jamb
+_EDGE = SOME  # part of the height of an opening, of its top, in which its arch or lintel lies
+_FEWEST = GROUP  # stones of an arch, and courses that end flush at a corner
+_BESIDE = MOST  # part of a stone's height that lies beside an opening, for a jamb
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from ground.errors import SurveyError, UsageError
 from survey.arrays import Bools
 from survey.clouds.pictures.joints import Field
-from survey.clouds.views.orthophoto import STEP, filled
+from survey.clouds.views.orthophoto import DEPTH_STEP, filled
 from survey.clouds.world import PixelPlace, world_of
+from survey.conventions import NEGLIGIBLE
 
-_STRETCHED = 0.02  # by which the two sides of a pixel may differ [-]
+_STRETCHED = NEGLIGIBLE  # by which the two sides of a pixel may differ [-]
 _INDEX = "cloud.json"  # of a folder that `moma cloud` writes
 
 
@@ -59,7 +60,7 @@ def open_photograph(
     pixel : side of a pixel [m]
     size : width and height of the picture [m]
     mask : picture of the same size, white where there is no wall
-    depth : depth map of 16 bits in steps of `STEP`; None: depth.png beside, if a cloud.json is there
+    depth : depth map of 16 bits in steps of `DEPTH_STEP`; None: depth.png beside, if a cloud.json is there
 
     Raises
     ------
@@ -83,7 +84,9 @@ def open_photograph(
         numbers = np.asarray(_opened(depth)[0]).astype(np.float32)
         _check_same(numbers.shape, (height, width), depth)
         lowest = _lowest(depth.parent / _INDEX)
-        depths = filled(np.where(numbers > 0, lowest + (numbers - 1.0) * STEP, np.nan).astype(np.float32))
+        depths = filled(
+            np.where(numbers > 0, lowest + (numbers - 1.0) * DEPTH_STEP, np.nan).astype(np.float32)
+        )
     return Photograph(path, pixels, depths, left_out, places, stated)
 
 

@@ -28,13 +28,14 @@ from survey.clouds.pictures.shapes import outline_shapes, without_mortar
 from survey.clouds.pictures.splitting import propose_missing
 from survey.clouds.pictures.suitability import Findings, judge_picture, judge_result
 from survey.clouds.settings import OutlineSettings
+from survey.conventions import LARGELY
 from survey.geometry.polygons import ring_area
 
 _REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a joint, over its width
-_HIDDEN = 0.6  # part of a stone that something covers from which it is not proposed
+_HIDDEN = LARGELY  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
 _CHROMA = slice(1, 3)  # channels of a* and b*: those of lightness step at every edge of a shade
-_OPEN = 6.0  # size of an opening over the width of a joint
+_OPEN = _REACH["rubble"]  # size of an opening over the width of a joint
 
 
 @dataclass(frozen=True)

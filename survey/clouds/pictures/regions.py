@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from survey.arrays import Array, Bools, Ints
 from survey.clouds._kernels.flooding import flood
 from survey.clouds.pictures.joints import STRONGEST, WIDTH, Field, Strength
+from survey.conventions import NEGLIGIBLE
 
 _WEAK = 0.3  # strength over that of a joint below which there is stone
 _APART = 2.0 * WIDTH  # distance between the middles of two regions [px]
-_TOWARDS = 0.02  # by which the place farthest from all joints is lower, over the strength of a joint
+_TOWARDS = NEGLIGIBLE  # by which the place farthest from all joints is lower, over the strength of a joint
 _REACH = round(WIDTH)  # distance from the middle of a joint at which the colour is that of the stone [px]
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from survey.clouds.pictures.channels import channels_of
 from survey.clouds.pictures.joints import WIDTH, Field, combined, grain_and_contrast
 
-_WIDTHS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)  # widths of joints that are tried [px]
+_WIDTHS = [width * 2.0**k for k in range(4) for width in (2.0, 3.0)]  # of joints that are tried [px]
 _SAMPLE = 512  # side of the parts of a picture that they are tried on, at most [px]
 _ENOUGH = 128.0  # side over the width of a joint from which a part is no larger: some courses of some stones
 

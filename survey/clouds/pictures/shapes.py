@@ -1,5 +1,6 @@
 """Stones without their mortar: masks, outlines with straight sides, and how sure their corners are."""
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -7,17 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array, Bools, Ints
+from survey.clouds.outlines.reading import SMOOTH
 from survey.clouds.outlines.tracing import few_corners, trace
 from survey.clouds.pictures.joints import WIDTH, Field
+from survey.conventions import CHECKED, ONE_WAY, SOME
 from survey.geometry.polygons import ring_area
 
-_STRAIGHT = 1.5  # distance of a traced boundary from the sides of its outline [px of the work]
-_MIN_CORNERS = 4  # corners of an outline that has none to spare
+_STRAIGHT = SMOOTH  # distance of a traced boundary from the sides of its outline [px of the work]
+_MIN_CORNERS = CHECKED  # corners of an outline that has none to spare
 _BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint
 _SIDE = 4.0  # length of what is seen of a side, over the width of a joint, from which it goes straight on when hidden
-_SQUARE = 0.6  # sine of the angle between the sides beside it: 37°
-_MIN_STONE_WIDTH = 1.5  # width of a stone over that of a joint
-_SEEN = 0.25  # contrast of mortar over the scatter of the wall from which its edge can be seen
+_SQUARE = math.sin(ONE_WAY)  # sine of the angle between the sides beside it
+_MIN_STONE_WIDTH = _BEVEL  # width of a stone over that of a joint
+_SEEN = SOME  # contrast of mortar over the scatter of the wall from which its edge can be seen
 _PIXEL = (
     0.75  # standard deviation of a corner where two straight sides meet [px of the work]: of rendered walls
 )

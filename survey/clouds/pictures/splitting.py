@@ -17,8 +17,9 @@ from scipy.special import expit
 from survey.arrays import Array, Bools, Ints
 from survey.clouds.pictures.bond import GAP, LIKELY, WEIGHTS
 from survey.clouds.pictures.joints import STRONGEST, WIDTH, Field, Strength
+from survey.conventions import LARGELY
 
-_ACROSS = 0.6  # part of the height of a region that a line crosses at least
+_ACROSS = LARGELY  # part of the height of a region that a line crosses at least
 _LEAN = 4  # pixels by which the ends of a line lean to either side
 _CLEAR = 2.0  # distance from the ends of a region over the width of a joint
 

@@ -6,8 +6,9 @@ from itertools import pairwise
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import SOME
 
-_STAGGERED = 0.25  # distance of a head joint from those below, over the height of its course, that bonds
+_STAGGERED = SOME  # distance of a head joint from those below, over the height of its course, that bonds
 
 
 def bond_statistics(

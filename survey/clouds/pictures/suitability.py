@@ -1,5 +1,6 @@
 """Fitness of a picture for outlines: what is too small, blurred, tilted, or no wall at all."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,14 +10,16 @@ from numpy.typing import NDArray
 from ground.statistics.scale import deviation
 from survey.arrays import Array
 from survey.clouds.pictures.channels import lightness
+from survey.conventions import CERTAIN, CHECKED, LEVEL, MOST
 
 _SMALLEST = 96  # pixels of the shorter side: fewer hold no two courses whose joints are three pixels wide
 _FAINT = 0.35  # contrast of joints over grain below which none stands out
-_TILTED = 2.0  # angle of the beds from level [degrees]: a surveyed wall leans less, its beds sag less
+_TILTED = math.degrees(
+    LEVEL
+)  # angle of the beds from level [degrees]: a surveyed wall leans less, its beds sag less
 _CONVERGING = 3.0  # change of the direction of beds or head joints over the picture [degrees]
-_CERTAIN = 4.0  # standard errors beyond which a change of direction is none by chance
-_MIN_STONES = 4  # stones from which a wall can be judged
-_UNSURE = 0.5  # mean score below which stones are more likely false
+_MIN_STONES = CHECKED  # stones from which a wall can be judged
+_UNSURE = MOST  # mean score below which stones are more likely false
 _SOFT = 0.44  # detail of a pixel over that of two at an edge blurred by two pixels; at a sharp edge 1.2
 _ROUNDED = 0.113  # standard deviation of L* that rounding to 8 bits makes: 100 / 255 / √12
 
@@ -148,5 +151,5 @@ def _directions(rings: Sequence[Array], upright: bool) -> tuple[float, float]:
     spread = deviation(angle[use] - terms @ angles, 0.0)
     share = weight[use] / weight[use].mean()
     error = spread * np.sqrt(np.diag(np.linalg.pinv((terms * share[:, None]).T @ terms)))
-    change = np.where(np.abs(angles) > _CERTAIN * error, np.abs(angles), 0.0)
+    change = np.where(np.abs(angles) > CERTAIN * error, np.abs(angles), 0.0)
     return float(angles[0]), float(change[1:].max())

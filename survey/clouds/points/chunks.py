@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 from ground.errors import SurveyError
 from survey.arrays import Array
+from survey.conventions import STEP
 from survey.records.survey import Station
 
 CHUNK = 1_000_000
 """Points of a chunk: 24 MB of coordinates, and large enough that a chunk's fixed costs do not count."""
 
+LINES = CHUNK // 4  # lines in memory at a time: strings of Python take 70 bytes each
 _HARMLESS = 0.0005  # rounding of single precision that no survey notices [m]
-_HOPELESS = 0.02  # beyond which points of a face lie on lines [m]
+_HOPELESS = STEP  # beyond which points of a face lie on lines [m]
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import SurveyError
+from ground.tables.columns import LONGEST_HEAD
 from survey.arrays import Array
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud, lost_digits
 from survey.records.survey import Station
 
-_LONGEST_HEAD = 40  # lines
-_TYPES = {("F", 4): "f4", ("F", 8): "f8", **{(t, n): f"{t.lower()}{n}" for t in "IU" for n in (1, 2, 4, 8)}}
+_TYPES = {
+    (kind.kind.upper(), kind.itemsize): f"{kind.kind}{kind.itemsize}"
+    for kind in map(np.dtype, f"{np.typecodes['AllInteger']}fd")
+}
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ def open_pcd(path: Path) -> PointCloud:
 
 def _head(file: BufferedReader, path: Path) -> tuple[_Head, Mapping[str, list[str]]]:
     words = dict[str, list[str]]()
-    for _ in range(_LONGEST_HEAD):
+    for _ in range(LONGEST_HEAD):
         name, *values = file.readline().decode("ascii", "replace").split() or [""]
         words[name] = values
         if name == "DATA":

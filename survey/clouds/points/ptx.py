@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 
 from ground.errors import SurveyError
 from survey.arrays import Array
-from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
+from survey.clouds.points.chunks import LINES, Chunk, PointCloud
+from survey.conventions import PER_MILLE
 from survey.records.survey import Station
 
 _WORDS = "1133334444"  # how many numbers stand on each line before the points of a scan
 _HEAD = len(_WORDS)
 _SHORTEST = 8  # bytes of a line of a point: "0 0 0 0" with its end
-_LINES = CHUNK // 4  # lines in memory at a time: Python's strings take 70 bytes each
-_AFFINE = 1e-3  # by which a rotation may differ from one, as its numbers are rounded
+_AFFINE = PER_MILLE  # by which a rotation may differ from one, as its numbers are rounded
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ def open_ptx(path: Path) -> PointCloud:
                     file.readline()
                 left = scan.count
                 while left > 0:
-                    rows = _rows(list(islice(file, min(left, _LINES))), path, scan.first + scan.count - left)
-                    left -= min(left, _LINES)
+                    rows = _rows(list(islice(file, min(left, LINES))), path, scan.first + scan.count - left)
+                    left -= min(left, LINES)
                     yield _chunk(rows, scan, origin, colours)
 
     return PointCloud(path, None, place, chunks, stations)

@@ -13,9 +13,8 @@ import numpy as np
 from ground.tables.columns import COORDINATES, length_scale
 from ground.tables.number_stream import NumberStream, open_numbers
 from survey.arrays import Array
-from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
+from survey.clouds.points.chunks import LINES, Chunk, PointCloud
 
-_LINES = CHUNK // 4  # lines in memory at a time: Python's strings take 70 bytes each
 _COLOURED = (6, 7)  # columns of x y z r g b, without or with an intensity before the colours
 _RGB = ("red", "green", "blue")
 _COLUMNS: Mapping[str, Sequence[str]] = {
@@ -49,7 +48,7 @@ def open_text(path: Path) -> PointCloud:
 
     def chunks(origin: Array, colours: bool) -> Iterator[Chunk]:
         """Yield chunks of points (n, 3) from `origin` [m], with colours (n, 3) on request."""
-        for numbers in rows(_LINES):
+        for numbers in rows(LINES):
             tinted = colours and coloured
             tints = np.clip(numbers[:, 3:], 0.0, 255.0).astype(np.uint8) if tinted else None
             yield Chunk(scales * numbers[:, :3] - origin, tints)

@@ -1,5 +1,6 @@
 """Orthophoto and depth map of a wall, painted point by point from clouds of any size."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,21 +14,22 @@ from survey.clouds._kernels.paint import Canvas, paint
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.wall import Wall
 from survey.clouds.world import world_file
+from survey.conventions import ALIKE, FEW, FINEST, SOME, TRIALS, WIDEST_JOINT
 from survey.quality.facades import upright_frame
 
-STEP = 1e-4
+DEPTH_STEP = FINEST
 """Step of the numbers of a depth map [m]."""
 
 _LARGEST = 40_000_000  # pixels: 800 MB of sums
 _SAMPLE = 4000  # points from which the plane of a wall is found
-_CLOSE = 0.05  # distance of a wall's points from its plane [m]
-_TRIES = 400  # planes that are tried: a wall with a fifth of the points is met by three in 125
-_UPRIGHT = 0.35  # vertical component of the normal up to which a plane is a wall: 20°
+_CLOSE = WIDEST_JOINT  # distance of a wall's points from its plane [m]
+_TRIES = TRIALS  # planes that are tried: a wall with a fifth of the points is met by three in 125
+_UPRIGHT = math.sin(ALIKE)  # vertical component of the normal up to which a plane is a wall: 20°
 _BEFORE = 0.3  # distance of ground from a wall [m]
-_FOOT = 0.2  # part of a wall's points below which the ground lies
-_GROUND = 0.05  # part of all points that makes it certain that there is ground
+_FOOT = SOME  # part of a wall's points below which the ground lies
+_GROUND = FEW  # part of all points that makes it certain that there is ground
 _FILLED = 2  # pixels by which gaps between points are closed
-_LIGHT = np.array([-0.5, 0.6, 0.62])  # direction to the light of a relief: from the upper left
+_LIGHT = np.array([-1.0, 1.0, 1.0])  # direction to the light of a relief: from the upper left
 
 Progress = Callable[[str, int, int | None], None]
 
@@ -237,14 +239,14 @@ def _relief(depths: NDArray[np.float32], pixel: float) -> NDArray[np.uint8]:
 def write_picture(picture: Picture, photo: Path, depth: Path) -> float:
     """Write orthophoto and depth map as PNG with their world files; return the depth of the number 1 [m].
 
-    The depth map has 16 bits: 0 without points, otherwise 1 + (depth - lowest) / `STEP`.
+    The depth map has 16 bits: 0 without points, otherwise 1 + (depth - lowest) / `DEPTH_STEP`.
     """
     from PIL import Image
 
     finite = np.isfinite(picture.depths)
-    lowest = float(np.floor(np.nanmin(picture.depths) / STEP) * STEP)
+    lowest = float(np.floor(np.nanmin(picture.depths) / DEPTH_STEP) * DEPTH_STEP)
     numbers = np.where(
-        finite, np.round((np.where(finite, picture.depths, lowest) - lowest) / STEP) + 1.0, 0.0
+        finite, np.round((np.where(finite, picture.depths, lowest) - lowest) / DEPTH_STEP) + 1.0, 0.0
     )
     Image.fromarray(np.clip(numbers, 0, 65535).astype(np.uint16)).save(depth)
     Image.fromarray(picture.colours).save(photo)

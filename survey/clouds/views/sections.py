@@ -14,11 +14,11 @@ from ground.errors import UsageError
 from survey.arrays import Array, Ints
 from survey.clouds.views.orthophoto import Picture, filled
 from survey.clouds.wall import Wall
+from survey.conventions import ROWS
 
 _PLANE = re.compile(r"\s*([zsd])\s*=\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:m\s*)?")
 _REACH = 3.0  # cells between neighbours on a line: two may be empty, and joints are recessed
 _SHORTEST = 4  # cells of the shortest line; fewer are stray points
-_MANY = 2_000_000  # cells in memory before equal ones are added up
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Section:
         self._keys.append(cells)
         self._sums.append(np.column_stack([flat, np.ones(len(flat))]))
         self._held += len(flat)
-        if self._held > _MANY:
+        if self._held > ROWS:
             self._compact()
 
     def lines(self, tolerance: float) -> list[Array]:
@@ -113,7 +113,7 @@ class Section:
 
     def _compact(self) -> None:
         """Add up the points of each cell."""
-        if len(self._keys) < 2 and self._held <= _MANY and not self._keys:
+        if len(self._keys) < 2 and self._held <= ROWS and not self._keys:
             return
         keys, sums = np.concatenate(self._keys), np.concatenate(self._sums)
         cells, which = np.unique(keys, axis=0, return_inverse=True)

@@ -11,10 +11,11 @@ import numpy as np
 from numba import njit
 
 from survey.arrays import Array
+from survey.conventions import VANISHING
 from survey.geometry._kernels.vectors import cross
 
-_COLLINEAR = 1e-9  # second singular value over the first below which there is no plane
-_UNCHECKED = 1e-9  # share of the other points in a residual below which they do not check it
+_COLLINEAR = VANISHING  # second singular value over the first below which there is no plane
+_UNCHECKED = VANISHING  # share of the other points in a residual below which they do not check it
 
 
 class Points(NamedTuple):

@@ -5,19 +5,21 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.conventions import CHECKED, CRITICAL, MANY, PARALLEL
 from survey.faces._kernels.planes import Points, leverages, orient, precision, weighted_plane
 from survey.faces._kernels.triples import STARTS, beside_the_rest, cost, search_triples, smallest
 from survey.geometry._kernels.vectors import dot
 
-FINE, NOT_FINITE, SIGMA, COLLINEAR = 0, 1, 2, 3  # status of `fit_face`
+FINE, NOT_FINITE, SIGMA, COLLINEAR = range(4)  # status of `fit_face`
 
-_CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
-_LARGEST_TILT = math.radians(10.0)  # standard deviation of a tilt that no candidate plane may exceed
-_GRAZING = 0.17  # cosine between normal and line of sight below which nobody measures a face: 80°
+_LARGEST_TILT = PARALLEL  # standard deviation of a tilt that no candidate plane may exceed
+_GRAZING = math.sin(
+    PARALLEL
+)  # cosine between normal and line of sight below which nobody measures a face: 80°
 _NARROW = 0.15  # width over length below which a subset of the points is not the whole face
-_MANY = 50  # points beyond which a single one hardly matters, and all are sorted at once
-_ROUNDING = 32.0 * 2.0**-52  # residual over largest coordinate that is rounding: 7 nm at 1,000 km
-_FEWEST = 4  # smallest set of points that a plane may shrink to
+_ROUNDING = (
+    32.0 * np.finfo(np.float64).eps
+)  # residual over largest coordinate that is rounding: 7 nm at 1,000 km
 
 
 @njit(cache=True)
@@ -56,7 +58,7 @@ def _is_clean(root, residuals, lever):
     for i in range(root.shape[0]):
         square = (root[i] * residuals[i]) ** 2
         total += square
-        if square > _CRITICAL**2 * max(1.0 - lever[i], 1e-6):
+        if square > CRITICAL**2 * max(1.0 - lever[i], 1e-6):
             return False
     return total <= _largest_sum(root.shape[0] - 3)
 
@@ -148,18 +150,18 @@ def _grow(accepted, majority, points, known, view, frame, work):
             share = max(1.0 - lever[i], 1e-6) if accepted[i] else 1.0 + lever[i]
             test = root[i] * abs(residuals[i]) / (scale * math.sqrt(share))
             tests[i] = test
-            fitting += test <= _CRITICAL
-            changed = changed or (test <= _CRITICAL) != accepted[i]
+            fitting += test <= CRITICAL
+            changed = changed or (test <= CRITICAL) != accepted[i]
             if accepted[i] and test > highest:
                 worst, highest = i, test
             elif not accepted[i] and test < lowest:
                 best, lowest = i, test
-        if n > _MANY and step < 10 and changed and fitting > majority:
+        if n > MANY and step < 10 and changed and fitting > majority:
             for i in range(n):
-                accepted[i] = tests[i] <= _CRITICAL
-        elif highest > _CRITICAL and count > majority:
+                accepted[i] = tests[i] <= CRITICAL
+        elif highest > CRITICAL and count > majority:
             accepted[worst] = False
-        elif best >= 0 and lowest <= _CRITICAL:
+        elif best >= 0 and lowest <= CRITICAL:
             accepted[best] = True
         else:
             break
@@ -182,10 +184,10 @@ def _without_outliers(points, known, view, frame, work):
     for rank in range(1, 1 + STARTS):
         count = 0
         for i in range(n):
-            other[i] = starts[rank, i] <= _CRITICAL
+            other[i] = starts[rank, i] <= CRITICAL
             count += other[i]
-        if count > _FEWEST:
-            rival = _grow(other, np.int64(_FEWEST), points, known, view, frame, work)
+        if count > CHECKED:
+            rival = _grow(other, np.int64(CHECKED), points, known, view, frame, work)
             if rival < score:
                 score = rival
                 for i in range(n):

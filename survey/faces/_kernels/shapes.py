@@ -9,10 +9,13 @@ import math
 import numpy as np
 from numba import njit
 
-_LIMIT = 3.29**2  # square of a standardised residual beyond which a point is an outlier: α₀ = 0.1 %
-_DIRECTIONS = 24  # directions tried for the line that divides the points
+from survey.conventions import CRITICAL, PLACES, SIGNIFICANT
+
+_LIMIT = (
+    CRITICAL * CRITICAL
+)  # square of a standardised residual beyond which a point is an outlier: α₀ = 0.1 %
 _TILTED = 6.63  # chi-square of one parameter at 1 %
-_FLATTEST = 3.0  # spread of points across a strip over their σ below which its tilt is not estimated
+_FLATTEST = SIGNIFICANT  # spread of points across a strip over their σ below which its tilt is not estimated
 
 
 @njit(cache=True)
@@ -151,8 +154,8 @@ def fit_two_planes(u, v, z, root):
     far, way, plane = np.zeros(n, dtype=np.bool_), np.zeros(2), np.zeros(3)
     across, along, moved = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
     first, second, zero = np.zeros(3), np.zeros(3), np.zeros(3)
-    for direction in range(_DIRECTIONS):
-        angle = 2.0 * math.pi * direction / _DIRECTIONS
+    for direction in range(PLACES):
+        angle = 2.0 * math.pi * direction / PLACES
         c, s = math.cos(angle), math.sin(angle)
         here, there = np.zeros((3, 4)), np.zeros((3, 4))
         for i in range(n):

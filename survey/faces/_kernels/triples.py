@@ -5,17 +5,16 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.conventions import CRITICAL, LARGELY, WEAR
 from survey.geometry._kernels.vectors import cross, dot
 
 STARTS = 6  # planes of least truncated squares that are kept
 
-_CRITICAL = 3.29  # two-sided normal quantile of Baarda's α₀ = 0.1 %
 _ALL_TRIPLES = 26  # number of points up to which all triples are tried: 2,600
 _DRAWS = 3000  # fixed draw of triples beyond that
-_EROSION = 0.03  # how far behind a face its eroded edges and its mortar lie [m]
-_IN_FRONT = _CRITICAL**2  # additional cost of an outlier less than that in front [squares of sigma]
+_IN_FRONT = CRITICAL * CRITICAL  # additional cost of an outlier less than that in front [squares of sigma]
 _FARTHEST = 2.5  # distance from the middle over that of the third quartile, beyond which a point may be beside the face
-_ALONE = 0.7  # least distance of such a point from its nearest neighbour, over that limit
+_ALONE = LARGELY  # least distance of such a point from its nearest neighbour, over that limit
 _BALANCED = 0.4  # length of the mean direction below which points lie all around
 _ALIKE = 2.0  # largest over smallest distance of corners from the middle of their face
 
@@ -49,10 +48,10 @@ def cost(test, root, side):
     The cost of an outlier is truncated at the limit, but doubles a little in front of the face: edges erode and mortar
     recedes behind it, so points in front are a sign that the plane is tilted into what lies behind.
     """
-    if test * test <= _CRITICAL**2:
+    if test * test <= CRITICAL**2:
         return test * test
     height = test / root * side
-    return _CRITICAL**2 + (_IN_FRONT if 0.0 < height < _EROSION else 0.0)
+    return CRITICAL**2 + (_IN_FRONT if 0.0 < height < WEAR else 0.0)
 
 
 @njit(cache=True)
@@ -94,7 +93,7 @@ def _keep(truncated, distances, scores, best):
     for rank in range(1, 1 + STARTS):
         same = True
         for m in range(n):
-            same = same and (best[rank, m] <= _CRITICAL) == (distances[m] <= _CRITICAL)
+            same = same and (best[rank, m] <= CRITICAL) == (distances[m] <= CRITICAL)
         if same:
             if scores[rank] <= truncated:
                 return

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from ground.errors import SurveyError
+from survey.conventions import CHECKED
 from survey.formats.native.cursor import Cursor
 from survey.records.survey import (
     OBSERVER,
@@ -20,8 +21,6 @@ from survey.records.survey import (
     SurfaceRule,
     SurveyHead,
 )
-
-_FEWEST_MARKS = 4  # a homography has eight unknowns
 
 
 class _Numbered(Protocol):
@@ -234,11 +233,11 @@ class HeadReader:
             marks[mark.photograph].append(replace(mark.mark, sigma=sigma))
         for name, photograph in self._photographs.items():
             where = self._places[f"photo {name}"]
-            if len(marks[name]) < _FEWEST_MARKS:
+            if len(marks[name]) < CHECKED:
                 raise SurveyError(
                     f"photo {name} has {len(marks[name])} marks",
                     where=where,
-                    remedy=f"tie it to the wall by {_FEWEST_MARKS} marks or more",
+                    remedy=f"tie it to the wall by {CHECKED} marks or more",
                 )
             if photograph.station is not None and photograph.station not in self._stations:
                 raise missing("station", photograph.station, self._stations, where)

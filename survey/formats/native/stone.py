@@ -7,6 +7,7 @@ import numpy as np
 
 from ground.tables.numbers import FARTHEST
 from survey.arrays import Array
+from survey.conventions import CORNERS
 from survey.formats.native.cursor import Cursor
 from survey.formats.native.header import missing, read_extrusion
 from survey.records.survey import BlockRecord, Extrusion, PointMark, SurveyHead
@@ -16,7 +17,6 @@ STONE_WORDS = (
 )  # fmt: skip
 """Words that begin a line of a stone."""
 
-_FEWEST_CORNERS = 3
 _PLACE = re.compile(
     r"[ \t]*(vertex|point)[ \t]+([-+.0-9eE]+)[ \t]+([-+.0-9eE]+)[ \t]+([-+.0-9eE]+)[ \t]*"
 ).fullmatch  # a number to `float` made of these characters is one here too
@@ -211,11 +211,11 @@ class StoneReader:
             raise cursor.fail(
                 f"stone {self.code} has both vertices and a photo", "keep one of the two outlines"
             )
-        if self._photograph is not None and len(self._pixels) < _FEWEST_CORNERS:
+        if self._photograph is not None and len(self._pixels) < CORNERS:
             raise cursor.fail(
                 f"stone {self.code} has {len(self._pixels)} pixels", "a face needs 3 pixels or more"
             )
-        if self._photograph is None and corners < _FEWEST_CORNERS:
+        if self._photograph is None and corners < CORNERS:
             raise cursor.fail(f"stone {self.code} has {corners} vertices", "a face needs 3 vertices or more")
 
     def _all_sigmas(self, common: float) -> Array | None:

@@ -17,13 +17,14 @@ from ground.errors import SurveyError
 from ground.tables.columns import COORDINATES
 from ground.tables.numbers import unreadable
 from ground.tables.rows import ListRows, cell_text
+from survey.conventions import LEAST
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.columns import kind_of_column, read_map
 from survey.formats.tables.reader import open_table
 from survey.formats.tables.wkt import ring_of
 from survey.records.survey import Reject, SurveyStream
 
-_DEGREES = 1e-3  # extents below which coordinates of stones are degrees, beside heights of metres
+_DEGREES = LEAST  # extents below which coordinates of stones are degrees, beside heights of metres
 _LARGEST = 1 << 29  # bytes
 
 

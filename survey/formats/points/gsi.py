@@ -13,13 +13,21 @@ from pathlib import Path
 
 from ground.tables.numbers import shown
 from ground.tables.text_lines import TextLines
+from ground.units import CENTI, FOOT, MILLI
+from survey.conventions import TENTH
 from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
 from survey.records.survey import SurveyStream
 
 _WORD = re.compile(r"(\d{2})(....)([+-])(.+)")
-_UNITS = {"0": 1e-3, "1": 0.3048e-3, "6": 1e-4, "7": 0.3048e-4, "8": 1e-5}
+_LAST_DIGIT = {
+    "0": MILLI,
+    "1": MILLI * FOOT,
+    "6": TENTH * MILLI,
+    "7": TENTH * MILLI * FOOT,
+    "8": CENTI * MILLI,
+}
 """Length of the last digit of a coordinate by the character for its unit [m]."""
 
 Place = tuple[float, float, float]
@@ -89,7 +97,7 @@ def _words(text: str, number: int, lines: TextLines) -> dict[str, str]:
             )
         index, data = parts[1], parts[4].rstrip()
         if index in ("81", "82", "83", "84", "85", "86"):
-            unit = _UNITS.get(parts[2][-1])
+            unit = _LAST_DIGIT.get(parts[2][-1])
             if unit is None or not data.isdigit():
                 raise lines.fail(
                     number,

@@ -13,13 +13,14 @@ from xml.parsers import expat
 
 from ground.errors import SurveyError
 from ground.tables.numbers import parse_number, shown, unreadable
+from ground.units import CENTI, FOOT, INCH, KILO, MILLI, SURVEY_FOOT
 from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
 from survey.records.survey import SurveyStream
 
-_METRIC = {"meter": 1.0, "metre": 1.0, "millimeter": 1e-3, "centimeter": 1e-2, "kilometer": 1e3}
-_LINEAR = {**_METRIC, "foot": 0.3048, "ussurveyfoot": 1200.0 / 3937.0, "inch": 0.0254}
+_METRIC = {"meter": 1.0, "metre": 1.0, "millimeter": MILLI, "centimeter": CENTI, "kilometer": KILO}
+_LINEAR = {**_METRIC, "foot": FOOT, "ussurveyfoot": SURVEY_FOOT, "inch": INCH}
 
 Element = Callable[[str, Mapping[str, str], str, int], None]
 

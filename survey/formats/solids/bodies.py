@@ -13,6 +13,7 @@ import numpy as np
 from ground.errors import GeometryError, SurveyError
 from ground.tables.numbers import FARTHEST
 from survey.arrays import Array
+from survey.conventions import JOINT, LEAST
 from survey.formats.solids.body_groups import body_groups, signed_volume
 from survey.formats.solids.flat_faces import merge_flat, rounding
 from survey.formats.solids.scanned_stone import is_scanned, plane_faces
@@ -24,10 +25,10 @@ from survey.geometry.watertight import check_watertight
 
 Polygon = tuple[int, ...]
 
-_COARSEST = 1e-3  # a third of the precision of a measured point [m]
+_COARSEST = LEAST  # a third of the precision of a measured point [m]
 _TOLERANCE = 1e-5  # of repairs, over the size of the body
 _MORE = (10.0, 100.0, 1000.0)  # times the tolerance, with which a repair is tried to advise on it
-_MAX_ADVISED_TOLERANCE = 0.01  # largest tolerance that is advised [m]
+_MAX_ADVISED_TOLERANCE = JOINT  # largest tolerance that is advised [m]
 
 
 @dataclass(frozen=True)

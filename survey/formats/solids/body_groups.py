@@ -14,13 +14,13 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import SAME
 from survey.geometry.solids import area_vector
 
 Polygon = tuple[int, ...]
 Edge = tuple[int, int]
 
-_SAME_DIRECTION = 1e-6  # angle below which faces of two stones coincide; no edge is so sharp [rad]
-_FULL = 2.0 * math.pi
+_FULL = math.tau
 
 
 def body_groups(vertices: Array, polygons: list[Polygon]) -> list[list[Polygon]]:
@@ -121,7 +121,7 @@ def _pairs(
     pairs = []
     for i, start in enumerate(starts):
         # the interior lies behind a face seen from outside: decreasing angle about its own direction
-        turns = [(start - stop - _SAME_DIRECTION) % _FULL for stop in stops]
+        turns = [(start - stop - SAME) % _FULL for stop in stops]
         pairs.append((i, min(range(len(stops)), key=turns.__getitem__)))
     if max(Counter(j for _, j in pairs).values()) > 1:
         raise GeometryError(

@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
+from survey.conventions import FLAT, TENTH
 
 Polygon = tuple[int, ...]
 
-_BULGE = 1e-4  # warp of a plane polygon rounded to a few digits, over its size
+_BULGE = FLAT  # warp of a plane polygon rounded to a few digits, over its size
 _SAME_PLANE = 1e-5  # distance from a common plane, over the size of the body
 _SAME_SIDE = (
-    0.9  # cosine between normals, a coarse test: those of thin triangles are poor, and heights decide
-)
+    1.0 - TENTH
+)  # cosine between normals, a coarse test: those of thin triangles are poor, and heights decide
 
 
 def rounding(corners: Array, resolution: float) -> float:

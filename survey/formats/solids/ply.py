@@ -24,7 +24,7 @@ _TYPES = {  # by name: the code of `struct`
 }
 _INTEGERS = "bBhHiI"
 _LISTS = ("vertex_indices", "vertex_index")
-_SINGLE = 2.0**-23  # relative resolution of single precision
+_SINGLE = float(np.finfo(np.float32).eps)  # relative resolution of single precision
 _LONGEST_HEADER = 1 << 16  # bytes
 _REMEDY = "export the PLY again"
 

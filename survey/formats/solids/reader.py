@@ -18,6 +18,7 @@ import numpy as np
 
 from ground.errors import GeometryError, SurveyError, UsageError
 from ground.tables.numbers import shown
+from survey.conventions import TENTH
 from survey.formats.fields import CODE, code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.solids.bodies import ClosedBody, RawBody, closed_bodies
@@ -35,7 +36,7 @@ from survey.records.snapping import Snapping
 from survey.records.survey import Reject, SolidRecord, SurveyStream
 
 _CODES = "{block}:{kind}"
-_MOST_CHANGE = 0.1  # largest relative change of a stone's volume by snapping
+_MOST_CHANGE = TENTH  # largest relative change of a stone's volume by snapping
 _BODIES: Mapping[str, Callable[[Path], Iterator[RawBody]]] = {
     ".obj": obj_bodies,
     ".ply": ply_bodies,

@@ -11,22 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import FEW, LARGELY, MANY, MAX_ROUNDS, MOST, NEARLY, PER_CENT, ROUNDING, SAME, TRIALS
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, volume_of
 
 _MANY = 500  # least number of facets: nobody models a stone with as many
-_SMALL = 0.05  # largest facet over the whole surface: a modelled stone has some large plane faces
-_BENT = 0.5  # least part of the edges that are bent: flat ones only divide a modelled face
-_FLAT = 1e-6  # one minus cosine of the angle across a flat edge
-_DIRECTIONS = 400  # facets whose normals are tried for each plane
-_ALIGNED = 0.8  # cosine of the angle between a facet and its plane while the plane is sought
-_LEANING = 0.5  # the same when facets are given to the plane found: those of a rough face lean
-_PLANE_REFINEMENTS = 10  # of refinement of one plane
-_MIN_FACE_SHARE = 0.01  # least area of a face over the whole surface
-_MAX_PLANES = 30  # planes
-_COVERED = 0.7  # least part of the surface that lies in the planes
-_VOLUME = 0.05  # largest change of the volume: broken corners and edges are filled
-_CUT = 1e-9  # distance within which corners are on a plane while cutting [m]
+_SMALL = FEW  # largest facet over the whole surface: a modelled stone has some large plane faces
+_BENT = MOST  # least part of the edges that are bent: flat ones only divide a modelled face
+_FLAT = SAME  # one minus cosine of the angle across a flat edge
+_DIRECTIONS = TRIALS  # facets whose normals are tried for each plane
+_ALIGNED = NEARLY  # cosine of the angle between a facet and its plane while the plane is sought
+_LEANING = MOST  # the same when facets are given to the plane found: those of a rough face lean
+_MIN_FACE_SHARE = PER_CENT  # least area of a face over the whole surface
+_MAX_PLANES = MANY  # planes
+_COVERED = LARGELY  # least part of the surface that lies in the planes
+_VOLUME = FEW  # largest change of the volume: broken corners and edges are filled
+_CUT = ROUNDING  # distance within which corners are on a plane while cutting [m]
 
 
 @dataclass(frozen=True)
@@ -133,13 +133,13 @@ def _largest(
     tried = normals[some[:: max(1, len(some) // _DIRECTIONS)]]
     scores = ((tried @ normals[some].T > _ALIGNED) * areas[some]).sum(axis=1)
     normal = tried[int(scores.argmax())]
-    for _ in range(_PLANE_REFINEMENTS):
+    for _ in range(MAX_ROUNDS):
         aligned = some[normals[some] @ normal > _ALIGNED]
         mean = (normals[aligned] * areas[aligned, None]).sum(axis=0)
         normal = mean / np.linalg.norm(mean)
     aligned = some[normals[some] @ normal > _ALIGNED]
     offset = _densest(centres[aligned] @ normal, areas[aligned], tolerance)
-    for _ in range(_PLANE_REFINEMENTS):
+    for _ in range(MAX_ROUNDS):
         heights = centres @ normal - offset
         taken = left & (np.abs(heights) <= tolerance) & (normals @ normal > _LEANING)
         if taken.sum() < 3:

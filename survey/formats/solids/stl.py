@@ -10,7 +10,7 @@ from ground.tables.numbers import parse_number, shown, unreadable
 from ground.tables.text_lines import TextLines
 from survey.formats.solids.bodies import RawBody, check_coordinates
 
-_SINGLE = 2.0**-23  # relative resolution of single precision
+_SINGLE = float(np.finfo(np.float32).eps)  # relative resolution of single precision
 _ORDER: Mapping[str, tuple[str, ...]] = {  # the line that must follow
     "solid": ("facet", "endsolid"),
     "facet": ("outer",),

@@ -14,6 +14,7 @@ import numpy as np
 from ground.errors import SurveyError
 from ground.tables.grids import exchanged_grid
 from survey.arrays import Array
+from survey.conventions import FARTHEST, MOST, TENTH
 from survey.formats.tables.point_table import TableStone
 from survey.geometry.solids import area_vector
 from survey.records.survey import SurveyHead
@@ -22,11 +23,10 @@ ORDERS = {"pnezd": "northing first", "penzd": "easting first"}
 """Order of the two level coordinates by format."""
 
 _WORDS = {"pnezd": ("pnezd", "pnez", "nez", "pneh", "neh"), "penzd": ("penzd", "penz", "enz", "penh", "enh")}
-_REACH = 1000.0  # beyond which nobody measures a stone with a total station [m]
 _SAME = 0.1  # distance within which two lists place a station at one point: it is set up anew there [m]
 _PAIRS = 6  # least pairs of neighbouring stones, and least corners' turns, for a habit: by chance 1 in 64
-_HABIT = 0.9  # share of stones from which a habit is one: the others are slips
-_LEVEL = 0.5  # horizontal share of a face's area below which it lies: left and right are not a wall's [-]
+_HABIT = 1.0 - TENTH  # share of stones from which a habit is one: the others are slips
+_LEVEL = MOST  # horizontal share of a face's area below which it lies: left and right are not a wall's [-]
 _NUMBER = re.compile(r"(.*?)(\d+)([^\d]*)")
 
 
@@ -45,7 +45,7 @@ def exchanged(places: Array, elsewhere: Array) -> bool:
     if not len(places) or not len(elsewhere):
         return False
     here, there = np.median(places, axis=0), np.median(elsewhere, axis=0)
-    return _distance(here, there) > _REACH >= _distance(_turned(here), there)
+    return _distance(here, there) > FARTHEST >= _distance(_turned(here), there)
 
 
 def _turned(place: Array) -> Array:
@@ -183,7 +183,7 @@ class AxisEvidence:
         if grid := exchanged_grid(self.places):
             yield f"coordinates are those of {grid} only with the axes exchanged"
         if exchanged(self.places, self.stated):
-            yield f"stations of the header file are over {_REACH:g} m away unless the axes are exchanged"
+            yield f"stations of the header file are over {FARTHEST:g} m away unless the axes are exchanged"
         if self.outlines.habit() < 0:
             yield "seen from the station, corners run clockwise and numbers rise from right to left, as in a mirror"
 

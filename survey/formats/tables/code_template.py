@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from itertools import product
 
 from ground.errors import UsageError
+from survey.conventions import CORNERS
 from survey.formats.fields import code_of
-from survey.formats.tables.point_table import FEWEST_CORNERS
 from survey.formats.tables.roles import CONTROL, ROLES, is_bare, role_of, roles_with
 
 _CODE, _CODE_LETTERS = r"[^\W_][\w.+/:-]{0,63}", r"\w.+/:-"
@@ -282,7 +282,7 @@ def _is_sensible(text: str, rows: Sequence[CodeFields | None]) -> bool:
     # the letter tells points from corners, and is none of the name
     if counted or "{role?}" in text or "{block}{role}" in text:
         return any(row.role == "point" and corners[row.block] for row in fields)
-    return "{role}" in text or max(corners.values(), default=0) >= FEWEST_CORNERS
+    return "{role}" in text or max(corners.values(), default=0) >= CORNERS
 
 
 def _end_in_kinds(fields: Sequence[CodeFields]) -> bool:

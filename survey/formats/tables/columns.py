@@ -23,7 +23,7 @@ from ground.tables.columns import (
     unit_of,
 )
 from ground.tables.numbers import shown
-from survey.formats.tables.point_table import FEWEST_CORNERS
+from survey.conventions import CORNERS, NEARLY
 
 ALIASES: Mapping[str, Sequence[str]] = {
     # English; German; French; Italian; Spanish
@@ -111,7 +111,7 @@ _MISSPELT = (
     *("course", "depth", "depth sigma", "depth source", "sigma", "station", "Tiefe", "Schicht", "profondeur"),
     *("profondità", "profundidad", "assise", "filare", "hilada"),
 )
-_ALIKE = 0.8  # similarity from which an unknown name is taken for a misspelt one
+_ALIKE = NEARLY  # similarity from which an unknown name is taken for a misspelt one
 
 
 @dataclass(frozen=True)
@@ -264,7 +264,7 @@ def _corners(names: Sequence[str]) -> tuple[tuple[int, int, int], ...]:
         if match := re.fullmatch(r"(.*\D)[ _]?([0-9]{1,2})", unit_of(name)[0]):
             places.setdefault(int(match[2]), {})[kind_of_column(match[1])] = k
     whole = [places[number] for number in sorted(places) if {"x", "y", "z"} <= places[number].keys()]
-    return tuple((one["x"], one["y"], one["z"]) for one in whole) if len(whole) >= FEWEST_CORNERS else ()
+    return tuple((one["x"], one["y"], one["z"]) for one in whole) if len(whole) >= CORNERS else ()
 
 
 def _mine(names: Sequence[str], column_map: ColumnMap, where: str) -> tuple[dict[str, int], tuple[int, ...]]:

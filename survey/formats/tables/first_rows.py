@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from ground.errors import SurveyError
-from ground.tables.columns import UNITS, length_unit, plain
+from ground.tables.columns import length_unit, plain
 from ground.tables.numbers import EMPTY, shown
 from ground.tables.rows import ListRows, TextRows
+from ground.units import LENGTHS
+from survey.conventions import CHECKED, CORNERS, GROUP
 from survey.formats.tables.code_template import CodeTemplate
 from survey.formats.tables.columns import ColumnMap, Columns, kind_of_column
-from survey.formats.tables.point_table import FEWEST_CORNERS, TableStone
+from survey.formats.tables.point_table import TableStone
 from survey.formats.tables.roles import CONTROL, ROLES, STATION, role_of, roles_with
 
 AnyRows = TextRows | ListRows
@@ -21,8 +23,8 @@ _ROLE_WORDS = frozenset(
     role for role in ROLES if len(role) > 1 or role in "vp"
 )  # other letters may number points
 _OF_STONES = {"vertex", "point", STATION, CONTROL}
-_FEW_WORDS = 3  # unknown ones in a column of roles
-_FEWEST = 4  # rows from which a table of a stone for each row is one of points without stones
+_FEW_WORDS = GROUP  # unknown ones in a column of roles
+_FEWEST = CHECKED  # rows from which a table of a stone for each row is one of points without stones
 _NO_CODE = "{block}:{role}:{kind}"  # a template beside which all usual ones are tried
 _ADVISED = re.compile(r'--codes "[^"]*"')
 
@@ -134,7 +136,7 @@ def with_units(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns
     if not all(stated[axis] for axis in "xyz") or name.lower() not in EMPTY | {""}:
         return 0, columns
     return 1, replace(
-        columns, scales={**columns.scales, **{k: UNITS[unit] for k, unit in stated.items() if unit}}
+        columns, scales={**columns.scales, **{k: LENGTHS[unit] for k, unit in stated.items() if unit}}
     )
 
 
@@ -148,7 +150,7 @@ def are_headed(rows: AnyRows, ahead: Sequence[tuple[int, Any]], columns: Columns
             values = [*rows.cells(row, number), *[""] * columns.count]
             if all(values[columns.at[axis]] for axis in "xyz"):
                 named.append(bool(values[columns.at["block"]]))
-    return bool(named) and named[0] and FEWEST_CORNERS * sum(named) <= len(named)
+    return bool(named) and named[0] and CORNERS * sum(named) <= len(named)
 
 
 def _unit(text: str) -> str | None:
@@ -191,7 +193,7 @@ def check_stones_repeat(
         if advice is not None and "{role" in advice[0]:
             remedy = f'if {shown(name)} holds codes, give --columns "{before}description={name}" {advice[0]}'
             break
-        if len(texts) >= FEWEST_CORNERS * len(set(texts)) > FEWEST_CORNERS:
+        if len(texts) >= CORNERS * len(set(texts)) > CORNERS:
             remedy = f'name the column of the stones: --columns "{before}block={name}"'
             break
     at = columns.at["block"]

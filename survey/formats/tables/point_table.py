@@ -10,10 +10,9 @@ import numpy as np
 from ground.errors import SurveyError
 from ground.tables.numbers import shown
 from survey.arrays import Array
+from survey.conventions import CORNERS
 from survey.records.survey import BlockRecord, Reject, SurveyHead
 
-FEWEST_CORNERS = 3
-"""Corners of a face."""
 _HOPELESS = 1000  # wrong lines without any stone after which the file is refused
 
 
@@ -143,7 +142,7 @@ class PointTable:
 
     def _record(self, stone: TableStone) -> BlockRecord | Reject:
         count = len(stone.vertices) // 3
-        if stone.error is None and count < FEWEST_CORNERS:
+        if stone.error is None and count < CORNERS:
             stone.error = SurveyError(
                 f"block {stone.code} has {count} vertices",
                 where=f"{self._path}:{stone.line}",

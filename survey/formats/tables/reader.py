@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from ground.errors import SurveyError
-from ground.tables.columns import plain
+from ground.tables.columns import LONGEST_HEAD, plain
 from ground.tables.decimals import Decimals
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
+from survey.conventions import LISTED, MANY, TRIALS
 from survey.formats.fields import CODE, KIND, NO_COURSE, NUMBERED_ANEW, code_of, parse_course
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.axes import (
@@ -65,10 +66,9 @@ _OF_STONES = ("depth", "depth_sigma", "depth_source", "depth_origin", "zone", "s
 _IDENTITY = ("block", "kind", "course", "role", "description")
 _LIST = {"pnezd": ("name", "y", "x", "z", "description"), "penzd": ("name", "x", "y", "z", "description")}
 _SEPARATORS = ("\t", ";", ",", "|", "")  # empty: any blanks
-_SAMPLE = 300  # first stones, by which the order of the axes is judged: habits show in far fewer
-_LOOK_AHEAD = 100  # rows in which the first good one, or the names of the columns, must be found
-_TITLES = 30  # rows before the names of the columns
-_LISTED = 12  # unknown kinds in a message
+_SAMPLE = TRIALS  # first stones, by which the order of the axes is judged: habits show in far fewer
+_LOOK_AHEAD = LONGEST_HEAD  # rows in which the first good one, or the names of the columns, must be found
+_TITLES = MANY  # rows before the names of the columns
 _CACHED = 4096  # identities
 _LONGEST_NAME = 64
 _UNKNOWN = EMPTY | {""}
@@ -465,10 +465,10 @@ class PointCollector:
         unknown = [stone for stone in stones if stone.kind not in self._options.known_kinds]
         if self._options.known_kinds and 2 * len(unknown) > len(stones):
             words = list(dict.fromkeys(str(stone.kind) for stone in unknown))
-            table = ",".join(f"{word}={meant(word, self._options.known_kinds)}" for word in words[:_LISTED])
+            table = ",".join(f"{word}={meant(word, self._options.known_kinds)}" for word in words[:LISTED])
             raise self.fail(
                 unknown[0].line,
-                f"unknown kinds: {', '.join(words[:_LISTED])}",
+                f"unknown kinds: {', '.join(words[:LISTED])}",
                 f'say what they stand for, e.g. --kinds "{table}"; ashlar is a stone of no special kind',
             )
 

@@ -8,15 +8,16 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.conventions import MOST, ONE_WAY
 from survey.geometry._kernels.vectors import dot
 
 GROUPS = 4
 """Directions in which one solid can touch another; further ones are merged with the nearest of these."""
 
-_ONE_WAY = 0.866
+_ONE_WAY = math.cos(ONE_WAY)
 """Cosine of 30°: overlaps nearer to parallel are one contact, however many faces make it."""
 
-_OF_STONE = 0.5
+_OF_STONE = MOST
 """Largest width of a joint over the thickness of the thinner stone, since no joint lies across a thin brick."""
 
 

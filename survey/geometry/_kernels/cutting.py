@@ -8,10 +8,10 @@ from numba import njit
 from survey.arrays import Array, Ints
 from survey.geometry._kernels.vectors import height_over
 
-FULL, EMPTY, OPEN = 0, 1, 2
+FULL, EMPTY, OPEN = range(3)
 """Outcome: a solid, nothing, or something that the planes do not close."""
 
-_MOST = 64
+MAX_CORNERS = 64
 """Largest number of corners of a face."""
 
 
@@ -21,7 +21,7 @@ class CutSolid(NamedTuple):
     Attributes
     ----------
     vertices : (room, 3) corners [m]
-    loops : (n + 6, _MOST) corners of each face, counter-clockwise seen from outside
+    loops : (n + 6, MAX_CORNERS) corners of each face, counter-clockwise seen from outside
     sizes : (n + 6,) number of corners of each face
     of_face : (n + 6,) plane on which each face lies; -1: a side of the box
     meeting : (room, 3) three planes that cross in each corner, those at the widest angles; -1: none cross at wide ones
@@ -100,10 +100,10 @@ def _cut(planes, p, near, solid, count, faces, distance):
     if not outside:
         return FULL, count, faces
     room = vertices.shape[0]
-    ends = np.empty((_MOST, 2), np.int64)  # cut edges, with the corner that each has got
-    made = np.empty(_MOST, np.int64)
+    ends = np.empty((MAX_CORNERS, 2), np.int64)  # cut edges, with the corner that each has got
+    made = np.empty(MAX_CORNERS, np.int64)
     cuts, kept = np.int64(0), np.int64(0)
-    work = np.empty(2 * _MOST, np.int64)
+    work = np.empty(2 * MAX_CORNERS, np.int64)
     for f in range(faces):
         n, size = sizes[f], 0
         for k in range(n):
@@ -118,7 +118,7 @@ def _cut(planes, p, near, solid, count, faces, distance):
                     if ends[c, 0] == low and ends[c, 1] == high:
                         found = made[c]
                 if found < 0:
-                    if count >= room or cuts >= _MOST:
+                    if count >= room or cuts >= MAX_CORNERS:
                         return OPEN, count, faces
                     t = distance[low] / (distance[low] - distance[high])
                     for k2 in range(3):
@@ -133,7 +133,7 @@ def _cut(planes, p, near, solid, count, faces, distance):
         below = False
         for k in range(size):
             below = below or distance[work[k]] < -near
-        if size >= 3 and below and size <= _MOST:
+        if size >= 3 and below and size <= MAX_CORNERS:
             for k in range(size):
                 loops[kept, k] = work[k]
             sizes[kept], of_face[kept] = size, of_face[f]
@@ -159,7 +159,7 @@ def _cap(p, loops, sizes, of_face, faces, count):
             if single:
                 after[b] = a
                 start, number = b, number + 1
-    if number < 3 or number > _MOST:
+    if number < 3 or number > MAX_CORNERS:
         return OPEN, count, faces
     at = start
     for k in range(number):

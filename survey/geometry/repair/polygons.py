@@ -5,12 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import VANISHING
 from survey.geometry.solids import Solid, area_vector
 from survey.geometry.watertight import triangulate
 
 Polygon = tuple[int, ...]
-
-_NO_HEIGHT = 1e-10  # height of a face without area, over the longest side
 
 
 def without_repeats(polygon: Sequence[int]) -> Polygon:
@@ -37,7 +36,7 @@ def is_flat_line(vertices: Array, polygon: Polygon) -> bool:
     length = float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).max())
     if not np.isfinite(length):
         return False
-    return float(np.linalg.norm(area_vector(corners))) <= _NO_HEIGHT * length * length
+    return float(np.linalg.norm(area_vector(corners))) <= VANISHING * length * length
 
 
 def simple_polygons(vertices: Array, polygon: Polygon) -> list[Polygon]:

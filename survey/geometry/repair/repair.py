@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from survey.arrays import Array
+from survey.conventions import FLAT, ROUNDS
 from survey.geometry.folds import warp
 from survey.geometry.repair.polygons import Polygon, is_flat_line, simple_polygons, without_repeats
 from survey.geometry.solids import Solid, area_vector
@@ -25,8 +26,7 @@ _SMALL = 0.03  # largest hole that is covered, over the area of the surface
 _CORNERS = 400  # most corners of such a hole
 _SLIT = 0.005  # widest slit that is brought together, over the size of the surface
 _REACH = 4.0  # distance across which a slit is brought together, over its mean width
-_FLAT = 1e-4  # warp of a hole that is covered by one face, over its size
-_WELDING_ROUNDS = 4  # of welding and dividing
+_FLAT = FLAT  # warp of a hole that is covered by one face, over its size
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def _joined(
 ) -> tuple[list[Polygon], tuple[str, ...]]:
     """Weld and divide open edges within the tolerance; return the polygons, and what was done."""
     welded, dropped, divided, farthest = 0, 0, 0, [0.0, 0.0]
-    for _ in range(_WELDING_ROUNDS):
+    for _ in range(ROUNDS):
         edges = open_edges(polygons)
         if not edges:
             break

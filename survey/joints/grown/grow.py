@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import LEAST
 from survey.extrusion.extrusion import prism
 from survey.geometry.polygons import ring_area
 from survey.geometry.solids import Solid
@@ -21,7 +22,6 @@ from survey.joints.settings import JointSettings
 _SAMPLES = 50  # along the side of a usual stone
 _CLOSE = 8  # and across the widest mortar, so that samples tell what it fills
 _SIDES = ("left", "below", "right", "above")  # of the frame
-_THINNEST = 1e-3  # metres: least thickness of mortar, where outlines touch
 
 _, _BELOW, _, _ABOVE = LEFT_BELOW_RIGHT_ABOVE
 
@@ -114,7 +114,7 @@ def _thickness(divided: Partition, codes: Sequence[str]) -> dict[frozenset[str],
             length = float(np.hypot(*(divided.corners[edge.ends[1]] - divided.corners[edge.ends[0]])))
             sums[frozenset(codes[k] for k in stones)].append((edge.thickness, length))
     return {
-        stones: max(sum(own * length for own, length in of) / sum(length for _, length in of), _THINNEST)
+        stones: max(sum(own * length for own, length in of) / sum(length for _, length in of), LEAST)
         for stones, of in sums.items()
     }
 

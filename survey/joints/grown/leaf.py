@@ -7,14 +7,14 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import PER_MILLE, THINNEST, VANISHING
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.joints.settings import JointMode, JointSettings
 from survey.records.survey import FRAME_NOTE, OUTLINE_NOTE
 from survey.simplify.simplify import BlockyStone
 
-_DRAWN = 1e-5  # metres: distance within which planes that were stated, not measured, are the same
-_TURNED = 1e-3  # of a stone's size: by which it may depart from a prism
-_LEVEL = 1e-9  # of a normal's upward component: less is rounding
+_DRAWN = THINNEST  # metres: distance within which planes that were stated, not measured, are the same
+_TURNED = PER_MILLE  # of a stone's size: by which it may depart from a prism
 _FRAME = 2e-3  # metres: distance within which stones state the same frame
 _DECIMALS = 9  # of the frame's coordinates in metres: what is left of rounding
 
@@ -141,7 +141,7 @@ def _alike(seed: _Prism, candidate: _Prism, within: float) -> bool:
 
 def _leaf(stones: Sequence[Stone], prisms: Sequence[_Prism], margin: float) -> Leaf:
     normal = np.mean([prism.normal for prism in prisms], axis=0)
-    if abs(normal[2]) < _LEVEL:
+    if abs(normal[2]) < VANISHING:
         normal[2] = 0.0
     normal /= np.linalg.norm(normal)
     right, up = _axes(normal)

@@ -19,13 +19,13 @@ from survey.arrays import Array, Ints
 from survey.geometry.polygons import inside
 from survey.joints.grown.openings import open_places, usual_width
 
-LEFT_BELOW_RIGHT_ABOVE = (-1, -2, -3, -4)
+LEFT_BELOW_RIGHT_ABOVE = tuple(range(-1, -5, -1))
 """Numbers that stand for the sides of the frame where a line runs along it instead of between two stones."""
 
 _FINEST = 1.0 / 16.0  # of the sampling distance: finest samples, where outlines come close to each other
 _INSET = (
-    1.0 / 16.0
-)  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
+    _FINEST  # of the sampling distance: samples lie within outlines by this, so that those that touch differ
+)
 _TOUCHING = 1.0 / 64.0  # of the sampling distance: samples of two stones nearer than this belong to neither
 _FINER_WITHIN = 2.0  # sampling distances within which another outline calls for finer samples
 _WIDEST = 4.0  # widths of the usual joint that mortar fills; traced rubble has pockets three of them wide

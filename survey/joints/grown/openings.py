@@ -13,10 +13,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from survey.arrays import Array, Bools, Ints
+from survey.conventions import PER_MILLE
 from survey.geometry.polygons import inside
 
 _SAME_SAMPLE = (
-    1e-3  # of the distance of a sample of an opening from its edge: samples as near to each other are one
+    PER_MILLE  # of the distance of a sample of an opening from its edge: nearer ones are one sample
 )
 
 

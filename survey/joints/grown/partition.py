@@ -9,17 +9,15 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import CORNERS, FEW, MAX_ROUNDS, MOST, PLACES, ROUNDS
 from survey.geometry.polygons import inside
 from survey.joints.grown.chains import apart, crosses, is_simple
 from survey.joints.grown.medial_lines import Line, MedialLines
 
-_CHORD = 0.5  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
-_STRAIGHTENINGS = 10  # in each of which edges that cross others follow their lines twice as closely
-_STEPS = 3  # of Newton's rule
-_FLATTEST = 0.05  # square of the growth of a difference of distances below which it tells no place
-_SHIFT = 0.5  # of its distance from the stones: farthest that a place moves
-_MIN_LINES = 3  # lines about a stone
-_PIECES = 24  # places of an edge at which its thickness is taken
+_CHORD = MOST  # of the mean thickness of a joint: largest distance of an edge from the medial line, within the mortar
+_FLATTEST = FEW  # square of the growth of a difference of distances below which it tells no place
+_SHIFT = MOST  # of its distance from the stones: farthest that a place moves
+_MIN_LINES = CORNERS  # lines about a stone
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,7 @@ def _exact(lines: MedialLines, outlines: Sequence[Array]) -> MedialLines:
 def _halfway(places: Array, first: Array, second: Array) -> Array:
     """Return places (n, 2) moved to where they are as far from one polygon as from the other."""
     moved = places
-    for _ in range(_STEPS):
+    for _ in range(ROUNDS):
         (near, out), (far, back) = _signed(moved, first), _signed(moved, second)
         rise = out - back
         steep = (rise**2).sum(axis=1)
@@ -155,7 +153,7 @@ def _met(place: Array, about: set[int], outlines: Sequence[Array]) -> Array:
     if len(stones) <= len(free) or not free:
         return place
     moved = place.copy()
-    for _ in range(_STEPS):
+    for _ in range(ROUNDS):
         distances = [_signed(moved[None], outlines[stone]) for stone in stones]
         apart_by = np.array([distances[0][0][0] - near[0] for near, _ in distances[1:]])
         rise = np.array([(distances[0][1][0] - out[0])[free] for _, out in distances[1:]])
@@ -249,7 +247,7 @@ def _straightened(
 ) -> tuple[Array, Chains, tuple[tuple[int, ...], ...]] | None:
     """Return corners, the corners of each line, and the rings of the stones; None if they cross to the last."""
     closely = dict.fromkeys(network.lines, 1.0)
-    for _ in range(_STRAIGHTENINGS):
+    for _ in range(MAX_ROUNDS):
         corners = list(network.nodes)
         chains: Chains = []
         of_stone: dict[int, list[int]] = defaultdict(list)
@@ -357,7 +355,7 @@ def _middles(path: Array) -> tuple[Array, Array]:
 
 def _edge(corners: Array, ends: tuple[int, int], line: Line, outlines: Sequence[Array]) -> Edge:
     start, stop = corners[list(ends)]
-    along = (np.arange(_PIECES) + 0.5) / _PIECES
+    along = (np.arange(PLACES) + 0.5) / PLACES
     thickness = _thickness(start + along[:, None] * (stop - start), line, outlines)
     widening = abs(float(np.polyfit(along, thickness, 1)[0])) / max(float(np.hypot(*(stop - start))), 1e-12)
     return Edge(ends, line.left, line.right, float(thickness.mean()), float(np.degrees(np.arctan(widening))))

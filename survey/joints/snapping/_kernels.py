@@ -8,10 +8,11 @@ import math
 import numpy as np
 from numba import njit
 
+from survey.conventions import TENTH
 from survey.geometry._kernels.adjacency import _basis, _boxes_apart, _buffers, _flatten, _shared
 from survey.geometry._kernels.vectors import dot
 
-_OPPOSITE = -0.9
+_OPPOSITE = TENTH - 1.0
 """Cosine of opposite faces: heights over the common plane decide, except for small faces."""
 
 

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ground.errors import UsageError
 from survey.arrays import Array, Ints
+from survey.conventions import VANISHING
 from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.folds import fold
 from survey.geometry.plane_network import Settled, settle
@@ -24,8 +25,6 @@ from survey.joints.snapping.matching_faces import Match, common_planes, find_mat
 from survey.records.snapping import OpenContact, Snapping
 
 Polygon = tuple[int, ...]
-
-_EXACT = 1e-12  # of the size of all: largest distance of a corner from its planes
 
 
 def snap(solids: Sequence[Solid], tolerance: float) -> tuple[tuple[Solid, ...], Snapping]:
@@ -84,7 +83,7 @@ class _Assembly:
                 return
             self._settled = settle(self._vertices, corner, plane)
             moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
-            np.maximum.at(moved, corner[np.abs(self._settled.residual) > _EXACT * self._size], np.inf)
+            np.maximum.at(moved, corner[np.abs(self._settled.residual) > VANISHING * self._size], np.inf)
             if moved.max() <= self._tolerance:
                 return
             self._let_go(moved)

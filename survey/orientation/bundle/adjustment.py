@@ -12,17 +12,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import EPSILON, MAX_ITERATIONS, VANISHING
 from survey.orientation._kernels.adjustment import Rays, Unknowns, back_substitute, reduced_normals
 from survey.orientation.network import INTERIOR, Network, Photo
 from survey.orientation.rotations import angle_slopes, turned
 
-MAX_ITERATIONS = 100
-"""Iterations of an adjustment."""
-
-SQUARES_ROUNDING = 1e-10
-"""Relative change of the sum of squares that is rounding."""
-
-_STILL = 1e-13  # predicted decrease of the sum of squares, relative, at which the iteration has converged
 _FIRST = 1e-4  # first damping tried [-]
 _STRONGEST = 1e12  # damping beyond which no step brings the residuals down [-]
 
@@ -189,10 +183,10 @@ def adjust(network: Network, prepared: Prepared) -> Solution:
         if step is not None:
             tried = corrected_unknowns(unknowns, *_corrections(prepared, unknowns, damping, step))
             taken += 1
-            if damping == 0.0 and abs(float(step @ right)) <= _STILL * max(square, 1e-12):
+            if damping == 0.0 and abs(float(step @ right)) <= EPSILON * max(square, 1e-12):
                 return Solution(tried, square, taken, behind)
             equations = normals(network, prepared, tried, 0.0)
-            if equations[2] <= square * (1.0 + SQUARES_ROUNDING):
+            if equations[2] <= square * (1.0 + VANISHING):
                 unknowns, (normal, right, square, behind) = tried, equations
                 damping = 0.0 if damping <= _FIRST else 0.1 * damping
                 if damping:

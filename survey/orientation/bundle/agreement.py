@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ground.errors import MomaError
 from survey.arrays import Array
+from survey.conventions import CHECKED, SIGNIFICANT
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
 from survey.orientation.bundle.control import FAR_OFF
 from survey.orientation.bundle.resection import TRIPLES, similarity_between
@@ -18,11 +19,9 @@ from survey.orientation.projection import project
 POOR = 3e-3
 """Median residual over the longer side of a photograph, beyond which an orientation is none."""
 
-AGREE = 3.0
+AGREE = SIGNIFICANT
 """σ₀ up to which photographs agree with each other without control points."""
 
-ENOUGH = 4
-"""Control points that must be left where one is left out: three give a similarity, the fourth checks it."""
 
 SEARCHES = 60
 """Adjustments in the search of gross errors: rounds of data snooping, photographs left out one at a time."""
@@ -74,7 +73,7 @@ def contradicted_control(network: Network, alone: Solution) -> list[tuple[Contro
     gcps = [
         gcp for gcp in network.control if not gcp.check and np.isfinite(alone.unknowns.point[gcp.point]).all()
     ]
-    if len(gcps) <= ENOUGH:
+    if len(gcps) <= CHECKED:
         return []
     there = np.array([gcp.place for gcp in gcps])
     off = np.linalg.norm(
@@ -82,7 +81,7 @@ def contradicted_control(network: Network, alone: Solution) -> list[tuple[Contro
     )
     sigma = np.sqrt([np.trace(gcp.covariance) / 3.0 for gcp in gcps])
     wrong = off > FAR_OFF * np.maximum(np.median(off), sigma)
-    if len(gcps) - wrong.sum() < ENOUGH:
+    if len(gcps) - wrong.sum() < CHECKED:
         return []
     return [(gcps[k], float(off[k])) for k in np.argsort(-off) if wrong[k]]
 

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from ground.errors import GeometryError, MomaError, SurveyError
+from survey.conventions import ENOUGH
 from survey.orientation.bundle.adjustment import Solution
 from survey.orientation.bundle.agreement import (
     AGREE,
@@ -23,7 +24,7 @@ from survey.orientation.projection import project
 Blunders = Literal["report", "remove"]
 """Treatment of marks that the test finds wrong."""
 
-_STATIONS = 5  # observed stations of which one that is off can be told
+_STATIONS = ENOUGH  # observed stations of which one that is off can be told
 
 
 def check_control(network: Network, solution: Solution, result: Statistics, blunders: Blunders) -> None:

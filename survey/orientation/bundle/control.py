@@ -1,24 +1,27 @@
 """Control points: whether they fit what the photographs show, and what they cannot tell."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import chdtri
 
 from ground.errors import SurveyError
-from survey.arrays import Array
+from survey.arrays import AXES, Array
+from survey.conventions import RARE, SOME
 from survey.orientation.bundle.adjustment import Solution
 from survey.orientation.bundle.start import FLAT
 from survey.orientation.bundle.statistics import Statistics
 from survey.orientation.network import Network, Photo
 
-MISSES = 2.33
+MISSES = math.sqrt(float(chdtri(AXES, RARE)) / AXES)
 """√(χ²₃ / 3) that a sound point exceeds once in a thousand cases."""
 
 FAR_OFF = 10.0
 """The same, beyond which it is a mistake, not chance."""
 
 # distance of a station from where it was given, over that from the control points, up to which they agree
-_STATION_DISTANCE = 0.3
+_STATION_DISTANCE = SOME
 _FOOTPRINT = 0.5  # of a pixel on the object, beyond which coordinates are hardly in metres [m]
 _FINE = 3e-3  # standard deviation of coordinates over that, below which they are not
 

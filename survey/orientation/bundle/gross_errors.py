@@ -11,6 +11,7 @@ import numpy as np
 
 from ground.errors import MomaError
 from survey.arrays import Array
+from survey.conventions import CRITICAL
 from survey.orientation.bundle.adjustment import EXTERIOR, Solution, adjust, prepare
 from survey.orientation.bundle.agreement import (
     AGREE,
@@ -23,7 +24,7 @@ from survey.orientation.bundle.agreement import (
     with_marks,
 )
 from survey.orientation.bundle.resection import resect
-from survey.orientation.bundle.statistics import CRITICAL, statistics
+from survey.orientation.bundle.statistics import statistics
 from survey.orientation.network import INTERIOR, Camera, Control, Network, Photo, listed
 from survey.orientation.projection import directions
 

@@ -15,11 +15,10 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import MAX_ITERATIONS, VANISHING
 from survey.orientation._kernels.adjustment import Unknowns, datum_sums
 from survey.orientation.bundle.adjustment import (
-    MAX_ITERATIONS,
     SIMILARITY,
-    SQUARES_ROUNDING,
     Prepared,
     Solution,
     corrected_unknowns,
@@ -99,7 +98,7 @@ def with_lengths(network: Network, prepared: Prepared, solution: Solution) -> So
         cameras, step, moved, square, behind = gauss_newton_step(network, prepared, unknowns)
         off, _, sigma = _observed(network, unknowns)
         total = square + float(((off / sigma) ** 2).sum())
-        if abs(before - total) <= SQUARES_ROUNDING * max(total, 1.0):
+        if abs(before - total) <= VANISHING * max(total, 1.0):
             return Solution(unknowns, square, solution.iterations + taken, behind)
         before = total
         fit = _fitted(network, prepared, unknowns, cameras, moved)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from ground.errors import GeometryError, MomaError, SurveyError
+from ground.statistics.scale import CONSISTENT
 from survey.arrays import Array
+from survey.conventions import CHECKED, CRITICAL, MOST, SIGNIFICANT, TENTH
 from survey.orientation.bundle.adjustment import Prepared, Solution, adjust, prepare
 from survey.orientation.bundle.agreement import (
     AGREE,
-    ENOUGH,
     POOR,
     SEARCHES,
     exchanged_control,
@@ -33,14 +34,13 @@ from survey.orientation.bundle.gross_errors import healed
 from survey.orientation.bundle.lengths import with_lengths
 from survey.orientation.bundle.soundness import check_network
 from survey.orientation.bundle.start import aligned, start_values, without_start
-from survey.orientation.bundle.statistics import CRITICAL, Statistics, statistics
+from survey.orientation.bundle.statistics import Statistics, statistics
 from survey.orientation.network import Control, Network, listed
 
 _GOOD = 5e-4  # the same, below which no other start is tried
-_LARGE = 3.0  # σ₀ from which the model is doubted rather than the marks
-_MANY = 0.1  # part of the marks left out, from which it is
-_MOST = 0.5  # part of the marks of one photograph left out, from which it is doubted as a whole
-_NORMAL = 0.6745  # median of the absolute value of a standard normal variable
+_LARGE = SIGNIFICANT  # σ₀ from which the model is doubted rather than the marks
+_MANY = TENTH  # part of the marks left out, from which it is
+_MOST = MOST  # part of the marks of one photograph left out, from which it is doubted as a whole
 _SMALL = 1500  # parameters of the cameras below which one thread of BLAS is faster than several
 
 
@@ -286,7 +286,7 @@ def _suspects(result: Statistics) -> NDArray[np.intp]:
 
 def _scale(tests: Array) -> float:
     sound = tests[np.isfinite(tests) & (tests > 0.0)]
-    return max(1.0, float(np.median(sound)) / _NORMAL) if len(sound) else 1.0
+    return max(1.0, CONSISTENT * float(np.median(sound))) if len(sound) else 1.0
 
 
 def _snooped(
@@ -341,7 +341,7 @@ def _wrong_control(
         return None
     worst = int(np.argmax(tests))
     left = [gcp.place for k, gcp in enumerate(network.control) if not gcp.check and k != worst]
-    return worst if len(left) >= ENOUGH else None
+    return worst if len(left) >= CHECKED else None
 
 
 def _worst_marks(network: Network, rays: NDArray[np.intp], suspects: NDArray[np.intp]) -> list[int]:

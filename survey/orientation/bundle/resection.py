@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
+from survey.conventions import PER_CENT, SAME, SAMPLE, VANISHING
 
 TRIPLES = 60
 """Random triples tried: with half of the points wrong, one is free of them but once in (8/7)⁶⁰ = 3,000 cases."""
 
-_FIVES = 80  # random fives of pairs of rays tried
-_ENOUGH = 12  # of these, after which nearly all pairs may end the search
-_AGREES = 0.01  # angle between a ray and the direction of its point [rad]
+_FIVES = TRIPLES  # random fives of pairs of rays tried
+_ENOUGH = SAMPLE  # of these, after which nearly all pairs may end the search
+_AGREES = PER_CENT  # angle between a ray and the direction of its point [rad]
 _PARALLEL = (
-    1e-10  # smallest eigenvalue of the sum of the projections across rays, below which they are parallel
+    VANISHING  # smallest eigenvalue of the sum of the projections across rays, below which they are parallel
 )
-_REAL = 1e-6  # imaginary part of a root that is rounding
 
 
 def resect(rays: Array, points: Array) -> tuple[Array, Array, int] | None:
@@ -80,7 +80,7 @@ def _three_point(rays: Array, points: Array) -> Iterator[tuple[Array, Array]]:
     for root in np.roots(quartic):
         v = float(root.real)
         under = 2.0 * (gamma - v * alpha)
-        if abs(root.imag) > _REAL * max(1.0, abs(v)) + 1e-4 or v <= 0.0 or abs(under) < 1e-12:
+        if abs(root.imag) > SAME * max(1.0, abs(v)) + 1e-4 or v <= 0.0 or abs(under) < 1e-12:
             continue
         u = ((m - 1.0) * v**2 - 2.0 * m * beta * v + 1.0 + m) / under
         square = 1.0 + v**2 - 2.0 * v * beta
@@ -229,13 +229,11 @@ def _decomposed(essential: Array) -> Iterator[tuple[Array, Array]]:
             yield u @ turn @ vt, side * u[:, 2]
 
 
-_CUBIC = (
-    (3, 0, 0), (2, 1, 0), (1, 2, 0), (0, 3, 0), (2, 0, 1), (1, 1, 1), (0, 2, 1), (1, 0, 2), (0, 1, 2), (0, 0, 3),
-)  # fmt: skip
-_BASIS = (
-    (2, 0, 0), (1, 1, 0), (0, 2, 0), (1, 0, 1), (0, 1, 1), (0, 0, 2), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0),
-)  # fmt: skip
-"""Exponents of x, y, z: monomials of the third degree, and those below."""
+def _monomials(degree: int) -> Iterator[tuple[int, int, int]]:
+    """Yield the exponents of x, y, z of the monomials of a degree, then of those below."""
+    for below in range(degree, -1, -1):
+        for z in range(below + 1):
+            yield from ((below - z - y, y, z) for y in range(below - z + 1))
 
 
 def _times(a: Array, b: Array) -> Array:
@@ -266,7 +264,7 @@ def _essential(first: Array, second: Array) -> Iterator[Array]:
         for j in range(3)
     ]
     equations.append(_sum(_times(e[0, j], minor[j]) for j in range(3)))
-    matrix = np.array([[equation[power] for power in (*_CUBIC, *_BASIS)] for equation in equations])
+    matrix = np.array([[equation[power] for power in _monomials(3)] for equation in equations])
     try:
         rest = -np.linalg.solve(matrix[:, :10], matrix[:, 10:])
     except np.linalg.LinAlgError:
@@ -276,6 +274,6 @@ def _essential(first: Array, second: Array) -> Iterator[Array]:
     action[[6, 7, 8, 9], [0, 1, 3, 6]] = 1.0
     values, vectors = np.linalg.eig(action)
     for value, vector in zip(values, vectors.T, strict=True):
-        if abs(value.imag) < _REAL and abs(vector[9]) > 1e-12:
+        if abs(value.imag) < SAME and abs(vector[9]) > 1e-12:
             x, y, z = (vector[6:9] / vector[9]).real
             yield x * space[0] + y * space[1] + z * space[2] + space[3]

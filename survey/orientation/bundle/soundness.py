@@ -3,15 +3,18 @@
 import numpy as np
 
 from ground.errors import SurveyError
+from survey.conventions import MOST, NEGLIGIBLE, PER_MILLE
 from survey.orientation.network import Camera, Network, listed
 from survey.orientation.projection import corrected
 
 _PIXELS_MM = (5e-4, 0.5)  # sizes of pixels, of sensors and of scanned plates [mm]
 _ANGLES = (0.25, 60.0)  # camera constant over the longer side of the photograph: from 127° to telescopes
-_DISTORTED = 0.5  # distortion in the corners over their distance from the principal point
-_TINY = 0.03  # largest coordinate of all marks over the size of the photographs, below which they are not in pixels
-_OUTSIDE = 0.02  # of the size of the photograph, marks may lie outside it
-_ON_LINE = 1e-3  # extent of control points across a line, over that along it
+_DISTORTED = MOST  # distortion in the corners over their distance from the principal point
+_TINY = (
+    NEGLIGIBLE  # largest coordinate of marks over the size of photographs, below which they are not in pixels
+)
+_OUTSIDE = NEGLIGIBLE  # of the size of the photograph, marks may lie outside it
+_ON_LINE = PER_MILLE  # extent of control points across a line, over that along it
 
 
 def check_network(network: Network) -> None:

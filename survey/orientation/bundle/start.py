@@ -12,6 +12,7 @@ import numpy as np
 
 from ground.errors import GeometryError, SurveyError
 from survey.arrays import Array
+from survey.conventions import CHECKED, FEW, LARGELY, LEVEL, SOME, TENTH
 from survey.orientation.bundle.resection import (
     essential_orientations,
     intersect_many,
@@ -24,12 +25,11 @@ from survey.orientation.projection import directions
 FLAT = 5e-3
 """Extent of control points off their plane over that in it, below which mirrored ones fit as well."""
 
-_APART = 0.05  # mean distance of start values from control points, over the extent of these, from which they are moved
-_BETTER = 0.2  # misfit of the right hand over that of the wrong one
-_ALIKE = 0.1  # difference of a reflection from an exchange or a change of sign of coordinates
-_MOST_AGREE = 0.6  # part of the known points of a photograph that must agree on its orientation
-_MIN_RESECTION_POINTS = 4  # known points of a resection
-_NARROW = np.radians(2.0)  # angle between rays below which a point is not used for resections
+_APART = FEW  # mean distance of start values from control points, over the extent of these, from which they are moved
+_BETTER = SOME  # misfit of the right hand over that of the wrong one
+_ALIKE = TENTH  # difference of a reflection from an exchange or a change of sign of coordinates
+_MOST_AGREE = LARGELY  # part of the known points of a photograph that must agree on its orientation
+_NARROW = LEVEL  # angle between rays below which a point is not used for resections
 
 
 def without_start(network: Network) -> Network:
@@ -181,7 +181,7 @@ def _rays(network: Network) -> Array:
 
 def _resectable(network: Network, control: dict[int, Array]) -> bool:
     controlled = np.isin(network.point, list(control))
-    return bool((np.bincount(network.photo[controlled], minlength=1) >= _MIN_RESECTION_POINTS).any())
+    return bool((np.bincount(network.photo[controlled], minlength=1) >= CHECKED).any())
 
 
 def _filled(
@@ -198,15 +198,13 @@ def _filled(
         _intersect(network, rays, oriented, places, firm)
         waiting = [f for f in range(len(network.photos)) if f not in oriented]
         usable = {f: [k for k in of_photo[f] if network.point[k] in firm] for f in waiting}
-        ready = sorted(
-            (f for f in waiting if len(usable[f]) >= _MIN_RESECTION_POINTS), key=lambda f: -len(usable[f])
-        )
+        ready = sorted((f for f in waiting if len(usable[f]) >= CHECKED), key=lambda f: -len(usable[f]))
         progress = False
         for f in ready:
             if len(usable[f]) < 0.5 * len(usable[ready[0]]):
                 break
             resected = resect(rays[usable[f]], np.array([places[network.point[k]] for k in usable[f]]))
-            if resected is None or resected[2] < max(_MIN_RESECTION_POINTS, _MOST_AGREE * len(usable[f])):
+            if resected is None or resected[2] < max(CHECKED, _MOST_AGREE * len(usable[f])):
                 misfits.add(f)
                 continue
             oriented[f] = resected[:2]
@@ -239,7 +237,7 @@ def _not_oriented(network: Network, f: int, count: int, misfit: bool) -> SurveyE
         remedy = "check their marks, the control points (are they mirrored?) and the unit of the camera"
     else:
         what += f"{count} of its points {'is' if count == 1 else 'are'} known"
-        remedy = f"mark {_MIN_RESECTION_POINTS} points on it that are control points or marked on two other photographs"
+        remedy = f"mark {CHECKED} points on it that are control points or marked on two other photographs"
     return SurveyError(what, where=photo.where or network.path, remedy=remedy)
 
 

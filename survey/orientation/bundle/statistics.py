@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dpotri
+from scipy.special import ndtri
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import CRITICAL, SAME
 from survey.orientation._kernels.adjustment import datum_sums, point_statistics
 from survey.orientation.bundle.adjustment import (
     Prepared,
@@ -29,11 +31,7 @@ from survey.orientation.bundle.lengths import LengthFit, fit_lengths
 from survey.orientation.network import Network
 from survey.orientation.rotations import angle_slopes
 
-CRITICAL = 3.29
-"""Two-sided normal quantile of Baarda's α₀ = 0.1 %, beyond which a standardised residual is a blunder."""
-
-_DETECTABLE = 4.13  # noncentrality δ₀ for α₀ = 0.1 % and a power of 80 %
-_MIN_REDUNDANCY = 1e-6  # redundancy number below which a coordinate is not checked by any other
+_DETECTABLE = CRITICAL + float(ndtri(0.8))  # noncentrality δ₀ for α₀ = 0.1 % and a power of 80 %
 _MIN_EIGENVALUE = 1e-11  # smallest eigenvalue of the scaled normal matrix that is more than rounding
 
 
@@ -71,8 +69,8 @@ class Statistics:
         """(n, 2) residuals over their own standard deviation, with the stated σ of the marks; 0 where unchecked."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(
-                self.parts > _MIN_REDUNDANCY,
-                self.residuals / np.sqrt(np.maximum(self.parts, _MIN_REDUNDANCY)),
+                self.parts > SAME,
+                self.residuals / np.sqrt(np.maximum(self.parts, SAME)),
                 0.0,
             )
 
@@ -81,8 +79,8 @@ class Statistics:
         """(n, 2) smallest blunder that the test finds with a probability of 80 %, in σ; inf where unchecked."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(
-                self.parts > _MIN_REDUNDANCY,
-                _DETECTABLE / np.sqrt(np.maximum(self.parts, _MIN_REDUNDANCY)),
+                self.parts > SAME,
+                _DETECTABLE / np.sqrt(np.maximum(self.parts, SAME)),
                 np.inf,
             )
 

@@ -18,19 +18,13 @@ from ground.errors import SurveyError
 from ground.tables.numbers import parse_number, shown
 from ground.tables.text_lines import TextLines
 from survey.arrays import Array
-from survey.orientation.formats.colmap_binary import binary_cameras, binary_images, binary_points
+from survey.orientation.formats.colmap_binary import MODELS, binary_cameras, binary_images, binary_points
 from survey.orientation.formats.marks import marked_well, marks_of_points, numbered
 from survey.orientation.formats.opencv import interior
 from survey.orientation.network import Camera, Network, Photo
 
-_MODELS = {
-    "SIMPLE_PINHOLE": ("f", "cx", "cy"),
-    "PINHOLE": ("fx", "fy", "cx", "cy"),
-    "SIMPLE_RADIAL": ("f", "cx", "cy", "k1"),
-    "RADIAL": ("f", "cx", "cy", "k1", "k2"),
-    "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
-    "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-}
+_MODELS = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")
+"""Models whose distortion is that of Brown."""
 _LONGEST = (
     1 << 26
 )  # bytes of a line, which holds all marks of a photograph or of a point: a million of 60 bytes
@@ -133,7 +127,7 @@ def _camera(
 ) -> Camera:
     if model not in _MODELS:
         raise _unknown(model, where)
-    names = _MODELS[model]
+    names = MODELS[model]
     if len(parameters) != len(names):
         raise SurveyError(
             f"{len(parameters)} parameters of {model}", where=where, remedy=f"it has {', '.join(names)}"

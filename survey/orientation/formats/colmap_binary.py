@@ -6,7 +6,7 @@ points3D.bin   id, place, colour, error, count, then image and mark of each obse
 """
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,23 +16,25 @@ from ground.errors import SurveyError
 from ground.tables.numbers import unreadable
 from survey.arrays import Array, Ints
 
-MODELS: Mapping[int, tuple[str, int]] = {
-    0: ("SIMPLE_PINHOLE", 3),
-    1: ("PINHOLE", 4),
-    2: ("SIMPLE_RADIAL", 4),
-    3: ("RADIAL", 5),
-    4: ("OPENCV", 8),
-    5: ("OPENCV_FISHEYE", 8),
-    6: ("FULL_OPENCV", 12),
-    7: ("FOV", 5),
-    8: ("SIMPLE_RADIAL_FISHEYE", 4),
-    9: ("RADIAL_FISHEYE", 5),
-    10: ("THIN_PRISM_FISHEYE", 12),
+MODELS: Mapping[str, Sequence[str]] = {
+    "SIMPLE_PINHOLE": ("f", "cx", "cy"),
+    "PINHOLE": ("fx", "fy", "cx", "cy"),
+    "SIMPLE_RADIAL": ("f", "cx", "cy", "k1"),
+    "RADIAL": ("f", "cx", "cy", "k1", "k2"),
+    "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
+    "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
+    "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+    "FOV": ("fx", "fy", "cx", "cy", "omega"),
+    "SIMPLE_RADIAL_FISHEYE": ("f", "cx", "cy", "k"),
+    "RADIAL_FISHEYE": ("f", "cx", "cy", "k1", "k2"),
+    "THIN_PRISM_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"),
 }
-"""Names of camera models, and the number of their parameters."""
+"""Camera models in the order of their numbers, and the names of their parameters."""
+
+_NAMES = tuple(MODELS)
 
 _MARK = np.dtype([("place", "<f8", 2), ("point", "<i8")])
-_TRACK = 8  # bytes of an observation of a point
+_TRACK = struct.calcsize("<II")  # bytes of an observation of a point: image, and its mark
 
 
 @dataclass(frozen=True)
@@ -104,10 +106,11 @@ def binary_cameras(path: Path) -> Iterator[tuple[int, str, tuple[int, int], list
     for _ in range(data.count):
         where = f"{path}, byte {data.place}"
         number, model, width, height = data.take("<IiQQ")
-        if model not in MODELS:
+        if not 0 <= model < len(_NAMES):
             raise data.fail(f"a camera model with the number {model}")
-        name, count = MODELS[model]
-        yield number, name, (width, height), [float(number) for number in data.take(f"<{count}d")], where
+        name = _NAMES[model]
+        values = [float(value) for value in data.take(f"<{len(MODELS[name])}d")]
+        yield number, name, (width, height), values, where
 
 
 def binary_images(path: Path) -> Iterator[BinaryImage]:

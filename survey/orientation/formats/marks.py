@@ -15,6 +15,7 @@ from ground.tables.columns import POINT, SIGMA, length_scale
 from ground.tables.numbers import is_number
 from ground.tables.table import Table, read_table
 from survey.arrays import Array
+from survey.conventions import CORNERS
 from survey.orientation.network import Camera, Network, Photo, listed
 
 _COLUMNS: Mapping[str, Sequence[str]] = {
@@ -47,7 +48,6 @@ _COLUMNS: Mapping[str, Sequence[str]] = {
     "y": ("y", "v", "row", "line", "y px", "py", "pixel y", "Zeile"),
     "sigma": SIGMA,
 }
-_MIN_MARKS = 3  # marks by which a photograph can be oriented
 _PLACES = {column: k for k, column in enumerate(_COLUMNS)}
 _REMEDY = "write: photograph, point, x, y, sigma if it has one"
 
@@ -189,7 +189,7 @@ def numbered(network: Network, table: Path) -> tuple[str, ...]:
 def marked_well(network: Network) -> Network:
     """Leave out photographs with too few marks to be oriented, with a remark that names them."""
     counts = np.bincount(network.photo, minlength=len(network.photos))
-    enough = counts >= _MIN_MARKS
+    enough = counts >= CORNERS
     if enough.all() or not enough.any():
         return network
     place, rays = np.cumsum(enough) - 1, enough[network.photo]
@@ -204,7 +204,7 @@ def marked_well(network: Network) -> Network:
         lines=network.lines[rays],
         remarks=(
             *network.remarks,
-            f"photographs with fewer than {_MIN_MARKS} marks are left out: {listed(names)}",
+            f"photographs with fewer than {CORNERS} marks are left out: {listed(names)}",
         ),
     )
 

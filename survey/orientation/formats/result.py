@@ -14,6 +14,7 @@ import numpy as np
 from ground.errors import SurveyError
 from ground.tables.numbers import unreadable
 from survey.arrays import Array
+from survey.conventions import FEW
 from survey.orientation.bundle.control import control_tests
 from survey.orientation.bundle.orient import Orientation
 from survey.orientation.bundle.statistics import photo_precision
@@ -21,7 +22,7 @@ from survey.orientation.network import INTERIOR, Camera, Photo
 from survey.orientation.oriented import Oriented
 from survey.orientation.rotations import angles, from_angles
 
-_CORRELATED = 0.95  # correlation from which two parameters are named
+_CORRELATED = 1.0 - FEW  # correlation from which two parameters are named
 _ANGLES = ("omega", "phi", "kappa", "x", "y", "z")
 
 

@@ -15,17 +15,16 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import EPSILON, GROSS, GROUP, MAX_ITERATIONS, PER_MILLE
 from survey.orientation.bundle.resection import intersect_rays
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import directions, project
 from survey.orientation.stones.located import Located, Mark, Sight, line_up
 
-_MAX_ITERATIONS = 20  # iterations
-_STILL = 1e-11  # movement of a point over its distance, below which it has converged
 _NARROWEST = 1.0  # angle between the outer rays of a point below which it is refused [°]
-_CHECKED = 1e-3  # deviation of a residual, over that of its mark, below which nothing checks it
-_ENOUGH = 3  # marks of a point of which one can be told to be wrong
-_MISSES = 6.0  # test of a mark beyond which it is of another point
+_CHECKED = PER_MILLE  # deviation of a residual, over that of its mark, below which nothing checks it
+_ENOUGH = GROUP  # marks of a point of which one can be told to be wrong
+_MISSES = GROSS  # test of a mark beyond which it is of another point
 
 
 def intersect(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Located:
@@ -82,13 +81,13 @@ def _intersected(oriented: Oriented, name: str, marks: Sequence[Mark]) -> Locate
             f"the rays of point {name} from {seen} meet at {np.degrees(angle):.1f}°",
             remedy="mark it on photographs taken from places further apart",
         )
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         rows = [line_up(oriented, mark, place) for mark in marks]
         by_point = np.concatenate([row[2] for row in rows])
         inverse = np.linalg.inv(by_point.T @ by_point)
         step = inverse @ by_point.T @ np.concatenate([row[0] for row in rows])
         place = place + step
-        if np.linalg.norm(step) < _STILL * np.linalg.norm(place - stations[0]):
+        if np.linalg.norm(step) < EPSILON * np.linalg.norm(place - stations[0]):
             break
     for mark, station in zip(marks, stations, strict=True):
         if not (place - station) @ oriented.rotation(mark.photo)[:, 2] < 0.0:

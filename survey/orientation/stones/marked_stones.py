@@ -13,6 +13,7 @@ import numpy as np
 
 from ground.errors import MomaError, SurveyError
 from survey.arrays import Array
+from survey.conventions import THINNEST
 from survey.orientation.formats.result import read_orientation
 from survey.orientation.oriented import Oriented
 from survey.orientation.stones.intersection import intersect
@@ -21,7 +22,7 @@ from survey.orientation.stones.plotting import plot
 from survey.orientation.stones.surfaces import Surface, fit_surface
 from survey.records.survey import BlockRecord, PointMark, Reject, SolidRecord, SurfaceRule, SurveyHead
 
-_MIN_SIGMA = 1e-5  # standard deviation along the normal below which a point counts no more [m]
+_MIN_SIGMA = THINNEST  # standard deviation along the normal below which a point counts no more [m]
 
 Item = BlockRecord | SolidRecord | Reject
 

@@ -9,17 +9,20 @@ the surface's height h give
 with the points Pᵢ that define the surface and the scatter s of faces about it: what the assumption costs along the ray.
 """
 
+import math
+
 import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import PARALLEL
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import directions
 from survey.orientation.stones.intersection import sight
 from survey.orientation.stones.located import Located, Mark, line_up
 from survey.orientation.stones.surfaces import Surface
 
-_GRAZING = 10.0  # flattest useful line of sight [°]
+_GRAZING = math.degrees(PARALLEL)  # flattest useful line of sight [°]
 
 
 def plot(oriented: Oriented, name: str, mark: Mark, surface: Surface) -> Located:

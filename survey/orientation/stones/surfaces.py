@@ -8,15 +8,14 @@ import numpy as np
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import MAX_ITERATIONS, SOME, TRIALS
 from survey.faces.planes import FaceFit, fit_plane
 from survey.orientation.oriented import Oriented
 from survey.orientation.stones.located import Located, joint_covariance
 
 _MIN_CYLINDER_POINTS = 6  # points of a cylinder: five parameters, and one that checks them
-_DIRECTIONS = 300  # directions of the axis tried
 _TRIED = 6  # of these, the best, from which the fit starts
-_MAX_ITERATIONS = 60  # iterations
-_VAGUE = 0.25  # standard deviation of the radius over it, beyond which an arc is too short
+_VAGUE = SOME  # standard deviation of the radius over it, beyond which an arc is too short
 
 
 class Surface(Protocol):
@@ -234,8 +233,8 @@ def _scatter(residuals: Array, sigma: Array, redundancy: int) -> float:
 
 def _starts(points: Array) -> list[Array]:
     """Return directions of the axis from which to start: those of circles that fit best."""
-    k = np.arange(_DIRECTIONS)
-    z = (k + 0.5) / _DIRECTIONS
+    k = np.arange(TRIALS)
+    z = (k + 0.5) / TRIALS
     turn = k * np.pi * (3.0 - np.sqrt(5.0))
     side = np.sqrt(1.0 - z * z)
     axes = np.column_stack([side * np.cos(turn), side * np.sin(turn), z])
@@ -274,7 +273,7 @@ def _refined(
     """Fit by Gauss–Newton steps; return square, centre, axis, axes across, radius and its σ, σ of points along it."""
     _, centre, radius = _circle(points, axis)
     square, vague, sigma, across = np.inf, np.inf, np.ones(len(points)), _frame(axis)
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         across = _frame(axis)
         distance, rows = _slopes(points, centre, axis, across)
         outward = rows[:, :2] @ across

@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 from ground.statistics.roots import root_of
 from ground.statistics.scale import OUTLIER, WITHIN, scatter_beyond
 from survey.arrays import Array
+from survey.conventions import FINEST, GROUP, LEAST, MOST, PLACES, SAMPLE, SIGNIFICANT
 from survey.quality.courses import CourseLine, measure_courses, with_scatter
 from survey.quality.departures.shapes import (
-    FINEST,
-    LEAST,
     LIKELY,
     Found,
     Run,
@@ -42,11 +41,10 @@ CHANCE = 0.003
 """Probability that the beds of a survey without any movement are given one."""
 
 
-_PLACES = 24  # most places of a wall at which a step is looked for
-_CLOSE = 0.5  # of the median length of a stone: distance of two such places
+_CLOSE = MOST  # of the median length of a stone: distance of two such places
 _REACH = 1.2  # of the median length of a stone: distance from the step at which a course may be broken
 _MIN_STONES_BESIDE = (
-    3  # stones on either side of a step or an edge; fewer are odd stones, not a part of the wall
+    GROUP  # stones on either side of a step or an edge; fewer are odd stones, not a part of the wall
 )
 _PER_DIFFERENCE = (
     0.45  # degrees of freedom that a difference of neighbours gives: each stone is in two of them
@@ -54,9 +52,12 @@ _PER_DIFFERENCE = (
 _PER_RESIDUAL = (
     0.8  # degrees of freedom that a residual gives: the variance of a clipped normal variable is less known
 )
-_ENOUGH = 12  # differences from which a wall's own scatter is estimated; fewer take that of the survey
-_EXCLUDES = 3.0  # standard deviations by which a course differs from a movement that it has not taken part in
-_RANKS = {"tilt": 0, "sag": 1, "step": 2, "left end": 3, "right end": 3, "part": 4}
+_ENOUGH = SAMPLE  # differences from which a wall's own scatter is estimated; fewer take that of the survey
+_EXCLUDES = (
+    SIGNIFICANT  # standard deviations by which a course differs from a movement that it has not taken part in
+)
+_SIMPLEST_FIRST = (("tilt",), ("sag",), ("step",), ("left end", "right end"), ("part",))
+_RANKS = {name: rank for rank, names in enumerate(_SIMPLEST_FIRST) for name in names}
 
 
 class BedKind(StrEnum):
@@ -510,7 +511,7 @@ def _places(sample: Sample, length: float) -> list[float]:
     every = np.sort(np.concatenate(middles)) if middles else np.zeros(0)
     if len(every) == 0:
         return []
-    close = max(_CLOSE * length, float(np.ptp(every)) / _PLACES)
+    close = max(_CLOSE * length, float(np.ptp(every)) / PLACES)
     places: list[float] = []
     for start in every.tolist():
         if places and start < places[-1] + close:

@@ -14,18 +14,17 @@ from scipy.spatial import cKDTree
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array
+from survey.conventions import ALIKE, ENOUGH, SOME, STEP
 from survey.quality.departures.shapes import critical
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 from survey.records.survey import DepthRule
 
-_ENOUGH = 5  # least number of stones for a median and its scatter
+_NEIGHBOURS = 8  # stones with which one is compared
 _DEPTH_SCATTER = 0.12  # scatter of depths that needs no reason, over the depth [-]
-_WITHOUT = 0.25  # standard deviation of a rule that states none, over its depth [-]
-_BESIDE = 8  # neighbours with which a stone is compared
-_PARALLEL = 20.0  # largest angle of two opposite faces [degrees]
+_WITHOUT = SOME  # standard deviation of a rule that states none, over its depth [-]
+_PARALLEL = math.degrees(ALIKE)  # largest angle of two opposite faces [degrees]
 _THICKEST = 6.0  # largest thickness of a wall whose two faces are set against each other [m]
-_JOINT = 0.02  # by which a through stone may miss the opposite face [m]
 _OPPOSITE = 0.3  # distance of a face on the other side, along and up, from the place opposite a stone [m]
 _SLENDER = 0.2  # depth over the shorter side of the face below which a stone is a slab [-]
 _LONG = 6.0  # depth over the longer side of the face above which it is a beam across the wall [-]
@@ -117,7 +116,7 @@ def _against_kind(
     for i in known:
         kinds[stones[i].kind].append(i)
     for kind, members in kinds.items():
-        if len(members) >= _ENOUGH:
+        if len(members) >= ENOUGH:
             yield from _among(
                 stones, members, members, limit, "kind", f"the other stones of its kind, {kind},"
             )
@@ -155,13 +154,13 @@ def _against_neighbours(
     there = set(with_depth)
     for facade in facades:
         members = [i for i in facade.members.tolist() if i in there]
-        rare = [i for i in members if counts[stones[i].kind] < _ENOUGH]
-        if len(members) <= _ENOUGH or not rare:
+        rare = [i for i in members if counts[stones[i].kind] < ENOUGH]
+        if len(members) <= ENOUGH or not rare:
             continue
         places = np.array([facade.frame.flatten(stones[i].outline).mean(axis=0) for i in members])
         tree = cKDTree(places)
         for i in rare:
-            near = tree.query(places[members.index(i)], k=min(_BESIDE + 1, len(members)))[1]
+            near = tree.query(places[members.index(i)], k=min(_NEIGHBOURS + 1, len(members)))[1]
             beside = [members[k] for k in np.ravel(near).tolist() if members[k] != i]
             yield from _among(stones, [i], beside, limit, "neighbours", "the stones beside it")
 
@@ -193,7 +192,7 @@ def _thickness(
 def _reaches(stone: StoneQuality, thick: float) -> bool:
     """Return whether a stone reaches through a wall, as a through stone does: nothing is odd about its depth."""
     assert stone.depth is not None
-    return abs(stone.depth - thick) <= _JOINT + 3.0 * _sigma(stone)
+    return abs(stone.depth - thick) <= STEP + 3.0 * _sigma(stone)
 
 
 def _sigma(stone: StoneQuality) -> float:
@@ -209,12 +208,12 @@ def _against_opposite(
     for i in known:
         stone, thick = stones[i], thickness.get(i)
         assert stone.depth is not None
-        if thick is None or stone.depth - thick - _JOINT <= limit * _sigma(stone):
+        if thick is None or stone.depth - thick - STEP <= limit * _sigma(stone):
             continue
         text = (
             f"it is {stone.depth:.2f} m deep and comes out of the opposite face, {thick:.2f} m behind its own"
         )
-        score = (stone.depth - thick - _JOINT) / max(_sigma(stone), 0.05 * thick)
+        score = (stone.depth - thick - STEP) / max(_sigma(stone), 0.05 * thick)
         yield DoubtfulDepth(stone.code, stone.line, "opposite face", stone.depth, thick, score, text)
 
 

@@ -22,10 +22,21 @@ from scipy.spatial import cKDTree
 
 from ground.statistics.scale import spread
 from survey.arrays import Array
+from survey.conventions import (
+    BROKEN,
+    ENOUGH,
+    FINEST,
+    GROUP,
+    LEAST,
+    PARALLEL,
+    ROUNDS,
+    SAMPLE,
+    STONE,
+    TENTH,
+    TUKEY,
+)
 from survey.quality.departures.bulges import bulge_profile, with_extent_and_profile
 from survey.quality.departures.shapes import (
-    FINEST,
-    LEAST,
     LIKELY,
     MOST,
     Found,
@@ -39,25 +50,29 @@ from survey.quality.departures.shapes import (
 from survey.quality.facades import Facade
 from survey.quality.precision import StoneQuality
 
-_JOINED = 0.10  # departure of neighbours from each other's plane within which they are of one wall [m]
+_NEIGHBOURS = 10  # stones with which one is compared
+_JOINED = BROKEN  # departure of neighbours from each other's plane within which they are of one wall [m]
 _WALL = 6  # least number of stones of a wall of its own; fewer stand out of the one behind them
-_NEIGHBOURS = 10  # neighbours with which a stone is compared
-_MIN_NEIGHBOURS = 5  # least number of neighbours of a plane
+_MIN_NEIGHBOURS = ENOUGH  # least number of neighbours of a plane
 _REACH = 6.0  # of the median size of a stone: distance of neighbours
-_TURNED = 12.0  # largest angle of a face to its wall [degrees]: splayed jambs are not of the wall
-_BISQUARE = 4.685  # limit of Tukey's weights [standard deviations]
+_TURNED = math.degrees(
+    PARALLEL
+)  # largest angle of a face to its wall [degrees]: splayed jambs are not of the wall
 _PER_STONE = 0.7  # degrees of freedom that a stone gives the scatter: neighbours are in each other's planes
 _PROJECTING = frozenset({"cornice", "coping", "corbel", "sill", "base", "capital", "slab", "boss"})
-_RANKS = {
-    "lean": 0, "bulge": 1, "bow": 1, "setback": 2, "offset": 2, "left end": 3, "right end": 3, "left corner": 3,
-    "right corner": 3, "leaning part": 3, "local bulge": 4,
-}  # fmt: skip
+_SIMPLEST_FIRST = (
+    ("lean",),
+    ("bulge", "bow"),
+    ("setback", "offset"),
+    ("left end", "right end", "left corner", "right corner", "leaning part"),
+    ("local bulge",),
+)
+_RANKS = {name: rank for rank, names in enumerate(_SIMPLEST_FIRST) for name in names}
 _GRID = 8  # places along and up the wall at which ends, offsets and bulges are looked for
-_MIN_MOVED_STONES = 3  # stones that a shape must move
-_MAX_ROUNDS = 3  # of odd stones and movements in turn, until the odd stones stay the same
+_MIN_MOVED_STONES = GROUP  # stones that a shape must move
 _BESIDE = 1.0  # of the median size of a stone: distance from a straight joint to which a crack zigzags
-_TRIALS = 12  # by which the place of a shape is sharpened
-_STEP = 0.1  # of the median size of a stone: step of the derivatives of a bulge by its places
+_TRIALS = SAMPLE  # by which the place of a shape is sharpened
+_STEP = TENTH  # of the median size of a stone: step of the derivatives of a bulge by its places
 
 
 class FaceKind(StrEnum):
@@ -199,7 +214,7 @@ class _Face:
     sigma: Array
     turn: Array = field(repr=False)
     turn_sigma: Array = field(repr=False)
-    size: float = 0.5
+    size: float = STONE
     bottom: float = 0.0
 
     def of(self, rows: NDArray[np.intp]) -> "_Face":
@@ -310,7 +325,7 @@ def _wall(name: str, zone: str | None, face: _Face, alpha: float, tilt: float) -
     limit = critical(alpha / 2.0, 3 * len(face.codes), freedom)
     movements: list[Found] = []
     odd: list[OddStone] = []
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(ROUNDS):
         # what the wall has taken is taken out: a stone beside a crack is no odd one
         moved = sum(
             (movement.amount * _field(movement.shape, face) for movement in movements),
@@ -423,7 +438,7 @@ def _beside(face: _Face) -> tuple[Array, Array, float]:
 
 def _bisquare(size: Array, distant: NDArray[np.bool_]) -> Array:
     """Return Tukey's weights (n, k) of residuals over their σ; those of neighbours that are all far off stay equal."""
-    share = np.minimum(size / _BISQUARE, 1.0)
+    share = np.minimum(size / TUKEY, 1.0)
     weights = np.where(distant, 0.0, (1.0 - share**2) ** 2)
     lost = weights.sum(axis=1) < 3.0
     weights[lost] = np.where(distant[lost], 0.0, 1.0)

@@ -17,28 +17,22 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr, stdtrit
+from scipy.special import ndtri, stdtr, stdtrit
 
 from survey.arrays import Array
+from survey.conventions import FEW, LEAST, ODDS, PER_CENT, SOME, VANISHING
 
-FINEST = 1e-4
-"""Standard deviation that no bed and no face is known better than [m]: a tenth of a millimetre."""
-
-LEAST = 1e-3
-"""Least movement or departure worth telling [m]: a millimetre, in which masons and surveyors count."""
-
-LIKELY = 1.645
+LIKELY = -float(ndtri(FEW))
 """Standard deviations by which a movement that is found in 95 of 100 surveys exceeds the critical value."""
 
 MOST = 5
 """Shapes that are taken by one wall; more are noise that the shapes before have left."""
 
 _MIN_SHARE_OF_LARGEST = (
-    0.25  # of the largest amount taken: smaller ones are what the shapes do not fit exactly
+    SOME  # of the largest amount taken: smaller ones are what the shapes do not fit exactly
 )
-_AS_GOOD = 6.0  # difference of Σ r²/v below which the simpler of two shapes is taken: odds of 20 to 1
-_NEARLY = 0.01  # the same, of the whole reduction: no wall moves exactly like a shape
-_NOTHING = 1e-9  # part of a shape's sum of squares that is left if the nuisance explains it [-]
+_AS_GOOD = ODDS  # difference of Σ r²/v below which the simpler of two shapes is taken: odds of 20 to 1
+_NEARLY = PER_CENT  # the same, of the whole reduction: no wall moves exactly like a shape
 
 Run = tuple[int, int]
 """First and last group."""
@@ -304,7 +298,7 @@ def _moments(sample: Sample, fields: Array, values: Array) -> _Moments:
         before = root * fields[members]
         after = before - basis @ (basis.T @ before)
         squares[k] = (after**2).sum(axis=0)
-        squares[k][squares[k] <= _NOTHING * (before**2).sum(axis=0)] = 0.0
+        squares[k][squares[k] <= VANISHING * (before**2).sum(axis=0)] = 0.0
         after[:, squares[k] == 0.0] = 0.0
         products[k] = after.T @ (root[:, 0] * values[members])
         tilts[k] = after.T @ (root[:, 0] * sample.tilt[members])

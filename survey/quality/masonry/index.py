@@ -13,11 +13,17 @@ Bulletin of Earthquake Engineering 13 (2015) 2647-2665, doi 10.1007/s10518-015-9
 """
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
+from typing import Any
 
 from scipy.special import ndtr
+
+from survey.conventions import TAIL
 
 
 class Direction(StrEnum):
@@ -53,23 +59,6 @@ PARAMETERS: Mapping[Parameter, str] = {
 }
 """Parameters, and what they are about."""
 
-_VALUES: Mapping[str, tuple[tuple[float, float, float], ...]] = {
-    "SM": ((0.3, 0.7, 1.0), (0.3, 0.7, 1.0), (0.5, 0.7, 1.0)),
-    "SD": ((0.0, 0.5, 1.0), (0.0, 0.5, 1.0), (0.0, 0.5, 1.0)),
-    "SS": ((0.0, 1.5, 3.0), (0.0, 1.0, 2.0), (0.0, 1.0, 2.0)),
-    "WC": ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), (0.0, 1.5, 3.0)),
-    "HJ": ((0.0, 1.0, 2.0), (0.0, 0.5, 1.0), (0.0, 1.0, 2.0)),
-    "VJ": ((0.0, 0.5, 1.0), (0.0, 1.0, 2.0), (0.0, 0.5, 1.0)),
-    "MM": ((0.0, 0.5, 2.0), (0.0, 1.0, 2.0), (0.0, 0.5, 1.0)),
-}  # of NF, PF, F for each direction
-_BOUNDS = ((2.5, 5.0), (3.0, 5.0), (4.0, 7.0))  # of categories B and A for each direction
-_CURVES: Mapping[str, tuple[int, tuple[float, float], tuple[float, float]]] = {
-    "compressive_strength": (0, (0.9370e6, 0.2232), (1.6882e6, 0.1988)),
-    "shear_strength": (1, (1.8913e4, 0.2168), (3.0253e4, 0.1992)),
-    "young": (0, (548.31e6, 0.1738), (821.24e6, 0.1634)),
-}  # direction of the index; factor [Pa] and exponent of the lower and the upper curve
-_POSSIBLE = 0.025  # probability from which a grade is within the range
-
 
 @dataclass(frozen=True)
 class Grade:
@@ -89,7 +78,7 @@ class Grade:
         """Grades within the range, from 0 (NF) to 2 (F)."""
         if self.chances is None:
             return (0, 1, 2)
-        return tuple(k for k, chance in enumerate(self.chances) if chance >= _POSSIBLE)
+        return tuple(k for k, chance in enumerate(self.chances) if chance >= TAIL)
 
     @property
     def words(self) -> str:
@@ -126,6 +115,12 @@ def graded(value: float, sigma: float, bounds: tuple[float, float], text: str) -
     return Grade((1.0 - low, low - high, high), text)
 
 
+def limits(name: str) -> tuple[float, float]:
+    """Return the limits of the paper from which a parameter is partly, and wholly fulfilled."""
+    partly, wholly = _published()["limits"][name]
+    return partly, wholly
+
+
 def index_range(grades: Mapping[Parameter, Grade], direction: Direction) -> tuple[float, float]:
     """Return the lowest and highest index that the grades allow.
 
@@ -134,11 +129,13 @@ def index_range(grades: Mapping[Parameter, Grade], direction: Direction) -> tupl
     grades : of all parameters
     direction : of the loads
     """
-    k = DIRECTIONS.index(direction)
+    values, k = _published()["values"], DIRECTIONS.index(direction)
 
     def index(end: int) -> float:
         """Return the masonry quality index at one end of the possible grades [-]."""
-        value = {name: _VALUES[name][k][grades[name].possible[end]] for name in PARAMETERS}
+        value: dict[Parameter, float] = {
+            name: values[name][k][grades[name].possible[end]] for name in PARAMETERS
+        }
         return value.pop(Parameter.SM) * sum(value.values())
 
     return index(0), index(-1)
@@ -146,7 +143,7 @@ def index_range(grades: Mapping[Parameter, Grade], direction: Direction) -> tupl
 
 def category(index: float, direction: Direction) -> str:
     """Return the category of an index: A is good, B average, C inadequate."""
-    low, high = _BOUNDS[DIRECTIONS.index(direction)]
+    low, high = _published()["categories"][direction]
     return "A" if index >= high else "B" if index >= low else "C"
 
 
@@ -158,7 +155,14 @@ def mechanical_ranges(indices: Mapping[Direction, tuple[float, float]]) -> dict[
     indices : lowest and highest index of each direction
     """
     ranges = {}
-    for name, (k, lower, upper) in _CURVES.items():
-        low, high = indices[DIRECTIONS[k]]
-        ranges[name] = (lower[0] * math.exp(lower[1] * low), upper[0] * math.exp(upper[1] * high))
+    for name, curve in _published()["curves"].items():
+        low, high = indices[Direction(curve["direction"])]
+        (least, slow), (most, fast) = curve["lower"], curve["upper"]
+        ranges[name] = (least * math.exp(slow * low), most * math.exp(fast * high))
     return ranges
+
+
+@cache
+def _published() -> Mapping[str, Any]:
+    """Return the tables of the paper: values of parameters, bounds of categories, curves of properties."""
+    return tomllib.loads(files(__package__).joinpath("index.toml").read_text(encoding="utf-8"))

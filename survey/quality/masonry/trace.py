@@ -16,16 +16,16 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from survey.arrays import Array
+from survey.conventions import JOINT, STONE, TOUCHING
 
 _JOINT = 0.08  # widest joint between two stones [m]; beyond is an opening, or the end of the wall
 _HEIGHTS = (0.7, 1.5)  # straight distances at which it is measured, about a metre [m]; their mean is taken
-_MIN_DISTANCE = 0.5  # least straight distance: of a low wall [m]
-_BESIDE = 0.01  # distance of the upright from the corner at whose head joint it begins [m]
+_MIN_DISTANCE = STONE  # least straight distance: of a low wall [m]
+_BESIDE = JOINT  # distance of the upright from the corner at whose head joint it begins [m]
 _SAMPLES = 40  # most lines of a wall, spread evenly
 _SMALL = 200  # stones of a wall up to which all its joints are a network
 _WINDOW = 1.2  # half width of the part of a larger wall around each upright, whose joints are one [m]
 _LONGEST = 3.0  # ratio beyond which it is not looked for: far more than any limit
-_SAME_PLACE = 1e-6  # places closer than this are one [m]
 
 
 @dataclass
@@ -123,7 +123,7 @@ def _joints(faces: Sequence[Array], chosen: Sequence[int]) -> tuple[_Network, li
             at = node[first[k] + side], node[first[k] + (side + 1) % len(face)]
             on_side = [(0.0, at[0]), (1.0, at[1])]
             for i, share in _feet(corners[others], start, stop):
-                if _SAME_PLACE < share < 1.0 - _SAME_PLACE:
+                if TOUCHING < share < 1.0 - TOUCHING:
                     foot = network.add(start + share * (stop - start))
                     on_side.append((share, foot))
                 else:
@@ -162,7 +162,7 @@ def _feet(points: Array, start: Array, stop: Array) -> Iterator[tuple[int, float
     """Yield the points that lie beside a side, within a joint's width: index, and share of the side."""
     run = stop - start
     square = float(run @ run)
-    if square < _SAME_PLACE**2:
+    if square < TOUCHING**2:
         return
     share = np.clip((points - start) @ run / square, 0.0, 1.0)
     distance = np.hypot(*(points - start - share[:, None] * run).T)
@@ -173,7 +173,7 @@ def _feet(points: Array, start: Array, stop: Array) -> Iterator[tuple[int, float
 def _distance(places: Array, starts: Array, stops: Array) -> Array:
     """Return the distance of places (n, 2) from the nearest of some sides (m, 2)."""
     run = stops - starts
-    square = np.maximum((run**2).sum(axis=1), _SAME_PLACE**2)
+    square = np.maximum((run**2).sum(axis=1), TOUCHING**2)
     away = places[:, None] - starts
     share = np.clip((away * run).sum(axis=2) / square, 0.0, 1.0)
     nearest: Array = np.hypot(*np.moveaxis(away - share[..., None] * run, 2, 0)).min(axis=1)
@@ -198,12 +198,12 @@ def section_trace(levels: Array, front: Array, back: Array) -> float:
     ends = np.unique(np.concatenate([front, back, [0.0, thick]]))
     cost = np.zeros(len(ends))
     for start, stop in zip(front, back, strict=True):
-        if start <= stop + _SAME_PLACE:
-            allowed = (ends >= start - _SAME_PLACE) & (ends <= stop + _SAME_PLACE)
-        elif start >= thick - _SAME_PLACE or stop <= _SAME_PLACE:
-            allowed = (ends <= _SAME_PLACE) | (ends >= thick - _SAME_PLACE)
+        if start <= stop + TOUCHING:
+            allowed = (ends >= start - TOUCHING) & (ends <= stop + TOUCHING)
+        elif start >= thick - TOUCHING or stop <= TOUCHING:
+            allowed = (ends <= TOUCHING) | (ends >= thick - TOUCHING)
         else:
-            allowed = np.abs(ends - (start + stop) / 2.0) <= abs(start - stop) / 2.0 + _SAME_PLACE
+            allowed = np.abs(ends - (start + stop) / 2.0) <= abs(start - stop) / 2.0 + TOUCHING
         moved: NDArray[np.float64] = (cost[None, :] + np.abs(ends[:, None] - ends)).min(axis=1)
         cost = np.where(allowed, moved, math.inf)
     height = float(levels.sum())

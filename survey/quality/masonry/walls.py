@@ -26,6 +26,7 @@ from scipy.special import expit
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array
+from survey.conventions import ALIKE, MOST, SOME, STEP, STONE, TENTH, WIDEST_JOINT
 from survey.geometry.polygons import ring_area
 from survey.quality.courses import lower_corners
 from survey.quality.facades import Facade
@@ -38,27 +39,24 @@ from survey.quality.masonry.index import (
     category,
     graded,
     index_range,
+    limits,
     mechanical_ranges,
 )
 from survey.quality.masonry.trace import minimum_traces, section_trace
 
 _MIN_WALL_STONES = 8  # least number of stones of a wall
 _ARCH = frozenset({"voussoir", "keystone", "springer", "rib_segment", "boss", "rib_springer", "web_stone"})
-_SIZES = (0.20, 0.40)  # sides of small and of large stones [m]
 _CUT = 0.85  # area over that of the convex hull above which sides are straight [-]
 _CORNERS = 8  # most corners of a cut face
-_THROUGH = 0.02  # height of a step at a head joint up to which a bed runs through: a joint [m]
-_HEAD_JOINT_DISTANCE = 0.06  # distance of corners at one head joint [m]
-_TRACE = (1.4, 1.6)  # of the line of minimum trace on a face, partly and wholly staggered
-_SECTION = (1.25, 1.55)  # of that in a section, partly and wholly bonded
-_HEADERS = (2.0, 5.0)  # per square metre, partly and wholly bonded
-_SHARES = (0.5, 0.9)  # of beds that run through, partly and wholly level
-_CUT_SHARES = (0.25, 0.75)  # of cut stone in the face, partly and predominant
-_OPPOSITE = math.cos(math.radians(160.0))  # of the angle between opposite faces
+_THROUGH = STEP  # height of a step at a head joint up to which a bed runs through: a joint [m]
+_HEAD_JOINT_DISTANCE = WIDEST_JOINT  # distance of corners at one head joint [m]
+_SHARES = (MOST, 1.0 - TENTH)  # of beds that run through, partly and wholly level
+_CUT_SHARES = (SOME, 1.0 - SOME)  # of cut stone in the face, partly and predominant
+_OPPOSITE = -math.cos(ALIKE)  # of the angle between opposite faces
 _THICKEST = 3.0  # thickest wall whose two faces are one section [m]
-_APART = 0.5  # distance of sections [m]
-_ROW = 0.02  # height of a row of a section [m]
-_LOWEST = 0.5  # least height of a section [m]
+_APART = STONE  # distance of sections [m]
+_ROW = STEP  # height of a row of a section [m]
+_LOWEST = STONE  # least height of a section [m]
 
 
 @dataclass(frozen=True)
@@ -186,7 +184,12 @@ def _judge(
         Parameter.HJ: _level(members, facade),
         Parameter.VJ: UNKNOWN
         if trace is None or trace_sigma is None
-        else graded(trace, trace_sigma, _TRACE, f"minimum trace {trace:.2f} ± {trace_sigma:.2f} on the face"),
+        else graded(
+            trace,
+            trace_sigma,
+            limits("face_trace"),
+            f"minimum trace {trace:.2f} ± {trace_sigma:.2f} on the face",
+        ),
         Parameter.WC: _bond(section, section_sigma, headers, kinds["header"], area),
     }
     indices = {direction: index_range(grades, direction) for direction in DIRECTIONS}
@@ -223,7 +226,7 @@ def _share(share: float, count: int, bounds: tuple[float, float], text: str) -> 
 def _size(stones: Sequence[WallStone]) -> Grade:
     sides = np.array([_side(stone) for stone in stones])
     sigma = np.array([max(math.sqrt(2.0) * stone.sigma, 1e-9) for stone in stones])
-    above = [float((expit(1.702 * (sides - limit) / sigma)).mean()) for limit in _SIZES]
+    above = [float((expit(1.702 * (sides - limit) / sigma)).mean()) for limit in limits("size")]
     count = len(stones)
     text = f"larger sides {np.median(sides):.2f} m, {100.0 * above[1]:.0f} % of them above 0.40 m"
     # fulfilled if most are large, not if most are small
@@ -292,10 +295,14 @@ def _bond(
     section: float | None, sigma: float | None, headers: float | None, count: int, area: float
 ) -> Grade:
     if section is not None and sigma is not None:
-        return graded(section, sigma, _SECTION, f"minimum trace {section:.2f} ± {sigma:.2f} in sections")
+        return graded(
+            section, sigma, limits("section_trace"), f"minimum trace {section:.2f} ± {sigma:.2f} in sections"
+        )
     if headers is not None:
         deviation = math.sqrt(count + 0.5) / area
-        return graded(headers, deviation, _HEADERS, f"{headers:.1f} ± {deviation:.1f} headers per m²")
+        return graded(
+            headers, deviation, limits("headers"), f"{headers:.1f} ± {deviation:.1f} headers per m²"
+        )
     return UNKNOWN
 
 

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-_STRAIGHT = 0.34  # sine of 20°: turn of a corner below which it may lie half-way along a side
-_PARALLEL = 1e-9  # sine below which two sides do not meet
+from survey.conventions import ALIKE, VANISHING
+
+_STRAIGHT = math.sin(ALIKE)  # sine of 20°: turn of a corner below which it may lie half-way along a side
 
 
 class Bounds(NamedTuple):
@@ -133,7 +134,7 @@ def _change(polygon, m, k, way, trial, source, labels):
         gone = (k + 1) % m
         vx, vy = _side(polygon, m, k + 1)
         turn = ux * vy - uy * vx
-        if turn < _PARALLEL * math.hypot(ux, uy) * math.hypot(vx, vy):
+        if turn < VANISHING * math.hypot(ux, uy) * math.hypot(vx, vy):
             return math.inf  # they do not meet beyond side k
         share = (wx * vy - wy * vx) / turn  # of the side before, to be added to it
         area = 0.5 * share * abs(ux * wy - uy * wx)

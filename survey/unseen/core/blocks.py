@@ -6,16 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import ROUNDING, TOUCHING
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, volume_of
+from survey.joints.overlaps import LEAST_VOLUME
 from survey.unseen.core.courses import Stretch, Strip, height_of, place_of, stretches, strips
 from survey.unseen.core.facings import FacingStone, FacingWall
 from survey.unseen.core.settings import InfillSettings
 
 _OUT = np.array([0.0, 0.0, 1.0])
-_ON_PLANE = 1e-10  # metres: distance within which corners lie on a plane
-_NOTHING = 1e-11  # cubic metres: smallest volume
-_SAME_JOINT = 1e-6  # metres: distance within which head joints are the same
 _MARGIN = 1.0  # metres around the cut region
 
 
@@ -75,7 +74,7 @@ def _cuts(sides: Iterable[Sequence[Stretch]]) -> list[_Cut]:
     cuts.sort(key=lambda cut: cut.place)
     distinct: list[_Cut] = []
     for cut in cuts:
-        if not distinct or cut.place - distinct[-1].place > _SAME_JOINT:
+        if not distinct or cut.place - distinct[-1].place > TOUCHING:
             distinct.append(cut)
     return distinct
 
@@ -191,17 +190,17 @@ def _carved(planes: list[Array], stones: _Stones) -> Solid | None:
 
 def _apart(solid: Solid, planes: Sequence[Array], stone: FacingStone) -> bool:
     """Return whether a convex solid and a stone have no volume in common."""
-    if any((solid.vertices @ plane[:3] >= plane[3] - _ON_PLANE).all() for plane in stone.planes):
+    if any((solid.vertices @ plane[:3] >= plane[3] - ROUNDING).all() for plane in stone.planes):
         return True
-    if any((stone.solid.vertices @ plane[:3] >= plane[3] - _ON_PLANE).all() for plane in planes):
+    if any((stone.solid.vertices @ plane[:3] >= plane[3] - ROUNDING).all() for plane in planes):
         return True
     shared = _common([*planes, *stone.planes])
-    return shared is None or volume_of(shared) <= _NOTHING
+    return shared is None or volume_of(shared) <= LEAST_VOLUME
 
 
 def _common(planes: Sequence[Array]) -> Solid | None:
     """Return the intersection of half-spaces; None if it is empty."""
     reach = max(abs(float(plane[3])) for plane in planes) + _MARGIN
     bounds = np.full(3, reach)
-    solid = intersection("", [tuple(plane) for plane in planes], -bounds, bounds, _ON_PLANE)
-    return solid if solid is not None and volume_of(solid) > _NOTHING else None
+    solid = intersection("", [tuple(plane) for plane in planes], -bounds, bounds, ROUNDING)
+    return solid if solid is not None and volume_of(solid) > LEAST_VOLUME else None

@@ -153,7 +153,7 @@ _DIAGONALS = [
     for a in (-1, 0, 1)
     for b in (-1, 0, 1)
     for c in (-1, 0, 1)
-    if (a, b, c) > (0, 0, 0) and (a != 0) + (b != 0) + (c != 0) >= 2
+    if (a, b, c) > (0, 0, 0) and (a != 0) + (b != 0) + (c != 0) > 1
 ]
 
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import WEAR
 from survey.unseen.core.facings import FacingStone, FacingWall
 from survey.unseen.core.settings import InfillSettings
 
 _ALONG, _UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-_OFF_BED = 0.03  # metres: distance from the bed of its course above which a corner is left out
+_OFF_BED = WEAR  # metres: distance from the bed of its course above which a corner is left out
 
 
 @dataclass(frozen=True)

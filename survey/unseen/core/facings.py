@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from ground.errors import GeometryError
 from survey.arrays import Array
+from survey.conventions import LARGELY, ON_PLANE, SMALL_STONE, STEP
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.geometry.solids import Solid, area_vector
 from survey.quality.facades import WallPlane, upright_frame
@@ -19,10 +20,9 @@ from survey.unseen.core.settings import InfillSettings
 
 Indices = NDArray[np.intp]
 
-_CONVEX = 1e-7  # metres: height of a corner of a convex solid in front of a face
-_SHARED = 0.02  # metres: least overlap of two faces across a wall, along it and upwards
-_FLUSH = 0.15  # metres: largest offset of a face from the next one of its facing
-_LEANING = 0.7  # cosine above which a face points along an axis
+_SHARED = STEP  # metres: least overlap of two faces across a wall, along it and upwards
+_FLUSH = SMALL_STONE  # metres: largest offset of a face from the next one of its facing
+_LEANING = LARGELY  # cosine above which a face points along an axis
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class FacingStone:
         unit = self.vectors / np.linalg.norm(self.vectors, axis=1)[:, None]
         corners = [self.solid.vertices[list(face)].mean(axis=0) for face in self.solid.faces]
         offsets = (unit * np.array(corners)).sum(axis=1)
-        if (self.solid.vertices @ unit.T - offsets).max() <= _CONVEX:
+        if (self.solid.vertices @ unit.T - offsets).max() <= ON_PLANE:
             return np.column_stack([unit, offsets])
         hull = ConvexHull(self.solid.vertices).equations
         return np.column_stack([hull[:, :3], -hull[:, 3]])

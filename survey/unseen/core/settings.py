@@ -3,6 +3,11 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from survey.conventions import WEAR, WIDEST_JOINT
+
+MAX_JOINT = 0.06
+"""Largest distance of stones of a course without a hole or an opening between them [m]."""
+
 
 class InfillShape(StrEnum):
     """Make of the core of a wall.
@@ -34,7 +39,7 @@ class InfillSettings:
     storey_height: float | None = None
     max_thickness: float = 2.5
     max_angle: float = 15.0
-    max_joint: float = 0.06
-    merge: float = 0.05
-    min_thickness: float = 0.03
-    level: float = 0.05
+    max_joint: float = MAX_JOINT
+    merge: float = WIDEST_JOINT
+    min_thickness: float = WEAR
+    level: float = WIDEST_JOINT

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import ON_PLANE, STEP
 from survey.geometry.solids import Solid
 from survey.unseen.core.cells import CellGrid, grid_solids
 from survey.unseen.core.courses import Strip, height_of, stretches, strips
@@ -21,8 +22,7 @@ from survey.unseen.core.settings import InfillSettings
 Interval = tuple[float, float]
 
 _OUT = np.array([0.0, 0.0, 1.0])
-_TOUCHING = 1e-9  # metres: depth by which a stone may reach into a cell without taking it
-_SNAP = 0.015  # metres: distance below which sides of deeper stones make one cut if possible
+_SNAP = STEP  # metres: distance below which sides of deeper stones make one cut if possible
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...
     """
     planes = [rows[0].lower, *(row.upper for row in rows)]
     if not deep:
-        return [(_Line(plane, _TOUCHING),) for plane in planes]
+        return [(_Line(plane, ON_PLANE),) for plane in planes]
     spans = np.array([[stone.above(plane) for stone in deep] for plane in planes])
     lowest, highest = np.abs(spans[:, :, 0]).argmin(axis=0), np.abs(spans[:, :, 1]).argmin(axis=0)
     beds: list[tuple[_Line, ...]] = []
@@ -187,10 +187,10 @@ def _beds(rows: Sequence[Strip], deep: Sequence[_Deep]) -> list[tuple[_Line, ...
         below, above = _one_or_two(downs, ups, 0.0)
         if len(ups) and len(downs) and above - below < float(np.median(downs) - np.median(ups)):
             across = 0.5 * (above - below)
-            beds.append((_Line(_moved(plane, below + across), across + _TOUCHING),))
+            beds.append((_Line(_moved(plane, below + across), across + ON_PLANE),))
         else:
             heights = sorted({below, above})
-            beds.append(tuple(_Line(_moved(plane, height), _TOUCHING) for height in heights))
+            beds.append(tuple(_Line(_moved(plane, height), ON_PLANE) for height in heights))
     return beds
 
 
@@ -240,7 +240,7 @@ def _grid(
             filled[i, j] = any(start <= middle <= stop for start, stop in covered[row])
             reach = np.minimum(along[:, 1], right) - np.maximum(along[:, 0], left)
             inside = (above[j, :, 1] > lower.slack) & (-above[j + 1, :, 0] > upper.slack)
-            for k in np.flatnonzero((reach > _TOUCHING) & inside).tolist():
+            for k in np.flatnonzero((reach > ON_PLANE) & inside).tolist():
                 filled[i, j, here[k].cells] = False
     return CellGrid(np.array(places), np.array([line.plane for line in lines]), np.array(planes), filled)
 

@@ -10,19 +10,19 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
 
 from survey.arrays import Array
+from survey.conventions import GROUP, MOST, SLOPED, SOME, WEAR
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line, line_through, meeting
 
 Ends = tuple[int, int]
 
 _WEDGES = {"voussoir", "keystone"}
-_ENOUGH = 3  # least number of voussoirs for the centre of an arch
 _REACH = 3.4  # lengths of a voussoir to the next one, where one or two are missing
 _OFF_CENTRE = 0.15  # radii: largest distance of a springer's joint from the centre
-_ONE_SKEWBACK = float(np.radians(4.0))  # angle within which sides of springers are one skewback
-_SHORTEST = 0.2  # sine of the least rise of a skewback
-_CROWDED = 0.5  # of a voussoir's angle: largest overlap of two of one ring
-_LEVEL = 0.03  # metres: height difference of the ends of a level extrados
+_ONE_SKEWBACK = SLOPED  # angle within which sides of springers are one skewback
+_SHORTEST = SOME  # sine of the least rise of a skewback
+_CROWDED = MOST  # of a voussoir's angle: largest overlap of two of one ring
+_LEVEL = WEAR  # metres: height difference of the ends of a level extrados
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def _offset(line: Line, by: float) -> Line:
 def _arches(elevation: Elevation) -> list[list[FlatStone]]:
     """Return rows of voussoirs and keystones with at most two missing between neighbours."""
     stones = [stone for stone in elevation.stones if stone.block.kind in _WEDGES]
-    if len(stones) < _ENOUGH:
+    if len(stones) < GROUP:
         return []
     centres = np.array([stone.centre for stone in stones])
     apart = cdist(centres, centres)
@@ -127,7 +127,7 @@ def _arches(elevation: Elevation) -> list[list[FlatStone]]:
     graph = coo_array(apart <= _REACH * usual)
     count, member = connected_components(graph, directed=False)
     groups = [[stone for stone, k in zip(stones, member, strict=True) if k == n] for n in range(count)]
-    return [group for group in groups if len(group) >= _ENOUGH]
+    return [group for group in groups if len(group) >= GROUP]
 
 
 def _centre(stones: Sequence[FlatStone]) -> Array | None:
@@ -147,7 +147,7 @@ def _centre(stones: Sequence[FlatStone]) -> Array | None:
                 line = line_through(*stone.outline[list(ends)])
                 normals.append([-line.direction[1], line.direction[0]])
                 places.append(line.point)
-        if len(normals) < _ENOUGH:
+        if len(normals) < GROUP:
             return None
         rows = np.array(normals)
         right = (rows * (np.array(places) - crowd)).sum(axis=1)

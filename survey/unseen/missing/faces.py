@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import CORNERS, WIDEST_JOINT
 from survey.extrusion.depth import Depth
 from survey.extrusion.extrusion import SurveyedBlock, extrude
 from survey.faces.common_planes import PlaneEstimate, common_plane
@@ -15,8 +16,7 @@ from survey.faces.shapes import FaceShape, ShapeKind
 from survey.records.survey import BlockRecord
 from survey.unseen.missing.sides import Elevation, FlatStone
 
-_SHORTEST = 0.05  # metres: least length of a side
-_ENOUGH = 3  # least number of faces for a common plane
+_ENOUGH = CORNERS  # least number of faces for a common plane
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def is_plausible(outline: Array) -> bool:
     run = np.roll(outline, -1, axis=0) - outline
     after = np.roll(run, -1, axis=0)
     turns = run[:, 0] * after[:, 1] - run[:, 1] * after[:, 0]
-    return bool((turns > 0.0).all() and (np.hypot(run[:, 0], run[:, 1]) >= _SHORTEST).all())
+    return bool((turns > 0.0).all() and (np.hypot(run[:, 0], run[:, 1]) >= WIDEST_JOINT).all())
 
 
 def _plane(corners: Array, beside: Sequence[FlatStone], elevation: Elevation) -> PlaneEstimate:

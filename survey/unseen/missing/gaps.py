@@ -8,15 +8,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from survey.arrays import Array, Ints
+from survey.conventions import BESIDE, PLACES, WIDEST_JOINT
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line
 
 _UP, _DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
-_AROUND = 4  # stones of the course that define the beds beside a gap
-_SAME_BED = 0.05  # metres: largest distance of ends of stones from one bed
-_BEYOND = 0.05  # metres above and below a gap at which stones are sought
-_SAMPLES = 21
-_SHARED = 0.05  # metres: least overlap of gaps of two courses that are one hole
+_SAME_BED = WIDEST_JOINT  # metres: largest distance of ends of stones from one bed
+_BEYOND = WIDEST_JOINT  # metres above and below a gap at which stones are sought
+_SHARED = WIDEST_JOINT  # metres: least overlap of gaps of two courses that are one hole
 _FRAMES = {"jamb": "a jamb", "mullion": "a mullion"}
 _BELOW = {"sill": "a sill"}
 _ABOVE = {"lintel": "a lintel", "voussoir": "an arch", "keystone": "an arch"}
@@ -201,11 +200,11 @@ def _gap(
     lower, upper = (_bed(members, towards, start, stop) for towards in (_DOWN, _UP))
     if lower is None or upper is None or upper.at_place(middle) <= lower.at_place(middle):
         return None
-    places = start + (np.arange(_SAMPLES) + 0.5) / _SAMPLES * (stop - start)
+    places = start + (np.arange(PLACES) + 0.5) / PLACES * (stop - start)
     below = _stones_at(elevation, places, lower, -_BEYOND)
     above = _stones_at(elevation, places, upper, _BEYOND)
     if _on_the_ground(elevation, lower, start, stop):
-        below = np.full(_SAMPLES, -2)
+        below = np.full(PLACES, -2)
     return CourseGap(zone, course, left, right, start, stop, lower, upper, below, above)
 
 
@@ -214,12 +213,12 @@ def _bed(members: Sequence[FlatStone], towards: Array, start: float, stop: float
     sides = [(stone, stone.side_ends(towards)) for stone in members]
     usable = [(stone, ends) for stone, ends in sides if ends is not None and not stone.worn & set(ends)]
     usable.sort(key=lambda entry: max(start - entry[0].centre[0], entry[0].centre[0] - stop))
-    edges = [stone.outline[list(ends)] for stone, ends in usable[: 2 * _AROUND]]
+    edges = [stone.outline[list(ends)] for stone, ends in usable[: 2 * BESIDE]]
     if not edges:
         return None
     heights = np.array([ends[:, 1].mean() for ends in edges])
     usual = np.abs(heights - np.median(heights)) <= _SAME_BED
-    return _fitted(np.concatenate([ends for ends, fits in zip(edges, usual, strict=True) if fits][:_AROUND]))
+    return _fitted(np.concatenate([ends for ends, fits in zip(edges, usual, strict=True) if fits][:BESIDE]))
 
 
 def _stones_at(elevation: Elevation, places: Array, bed: Line, above: float) -> Ints:
@@ -253,7 +252,7 @@ def _lies_on(upper: CourseGap, lower: CourseGap) -> bool:
 
 def _bounded(gap: CourseGap, hole: Sequence[CourseGap]) -> float:
     """Return the least part of a gap's length with stones, the ground or another gap of its hole, below or above."""
-    places = gap.start + (np.arange(_SAMPLES) + 0.5) / _SAMPLES * gap.width
+    places = gap.start + (np.arange(PLACES) + 0.5) / PLACES * gap.width
     parts = []
     for bordering, others in (
         (gap.below, [lower for lower in hole if _lies_on(gap, lower)]),

@@ -18,6 +18,7 @@ import numpy as np
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array
+from survey.conventions import BROKEN, CERTAIN, GROUP, SOME, STEP
 from survey.extrusion.depth import Depth
 from survey.unseen.missing.gaps import CourseGap
 from survey.unseen.missing.settings import MissingSettings
@@ -35,11 +36,11 @@ _PARTICULAR = {
     "infill",
     "support",
 }
-_ENOUGH = 3  # least number of stones of a kind for its usual length
-_LEAST_SIGMA = 0.02  # metres: least standard deviation of a kind's length
-_FURTHER = 0.3  # factor by which each further missing stone is less likely [-]
-_UNLIKELY = 3.5  # standard deviations beyond which a length is unusual
-_CLOSE = 0.1  # metres: distance of head joints of two courses beyond which they count as staggered
+_ENOUGH = GROUP  # least number of stones of a kind for its usual length
+_LEAST_SIGMA = STEP  # metres: least standard deviation of a kind's length
+_FURTHER = SOME  # factor by which each further missing stone is less likely [-]
+_UNLIKELY = CERTAIN  # standard deviations beyond which a length is unusual
+_CLOSE = BROKEN  # metres: distance of head joints of two courses beyond which they count as staggered
 
 
 @dataclass(frozen=True)

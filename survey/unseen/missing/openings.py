@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from survey.conventions import WEAR
 from survey.unseen.missing.gaps import CourseGap, Hole
 from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation
 
 _ENOUGH = 2  # least number of jambs on one side that show the edge of the opening
-_STRAIGHT = 0.03  # metres by which they may differ
+_STRAIGHT = WEAR  # metres by which they may differ
 _OF_ARCHES = {"voussoir", "keystone", "springer"}
 _LONGEST = 1.3  # of the longest jamb of the facade: a longer gap lacks other stones too
 

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import BROKEN, JOINT, ROUNDS, WIDEST_JOINT
 from survey.extrusion.extrusion import SurveyedBlock
+from survey.formats.options import SIGMA
 from survey.geometry.solids import area_vector
 from survey.unseen.missing.arches import ArchGap, arch_gaps, voussoir_outlines
 from survey.unseen.missing.faces import MissingFace, is_plausible, stone_of
@@ -24,12 +26,10 @@ from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line, elevations, meeting
 
 _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0])
-_USUAL_JOINT = 0.01  # metres, where no joint can be measured
-_SCATTER = 0.003  # metres: standard deviation of a stone's end about the middle of its joint
-_TALL = 0.04  # metres: distance of ends of gaps of two courses below which they belong to one stone
-_PROPOSAL_ROUNDS = 4  # rounds of proposals, each of which rests on the one before
-_BEHIND = 0.05  # metres: depth behind the face at which stones seen from elsewhere are compared
-_SPLIT_SIGMA = 0.08  # metres: standard deviation of the joint between two missing stones
+_SCATTER = SIGMA  # metres: standard deviation of a stone's end about the middle of its joint
+_TALL = WIDEST_JOINT  # metres: distance of ends of gaps of two courses below which they belong to one stone
+_BEHIND = WIDEST_JOINT  # metres: depth behind the face at which stones seen from elsewhere are compared
+_SPLIT_SIGMA = BROKEN  # metres: standard deviation of the joint between two missing stones
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def propose_missing(
         mine = {id(stone.block) for stone in elevation.stones}
         others = [block for block in blocks if id(block) not in mine]
         # the space beside a missing jamb is a hole of its own once the jamb is there
-        for _ in range(_PROPOSAL_ROUNDS):
+        for _ in range(ROUNDS):
             new = []
             for propose in (_voussoirs, _of_courses):
                 proposed = list(propose(elevation, settings, codes))
@@ -143,7 +143,7 @@ def _flat(block: SurveyedBlock, elevation: Elevation) -> FlatStone:
 
 def _voussoirs(elevation: Elevation, settings: MissingSettings, codes: _FreeCodes) -> Iterator[MissingStone]:
     gaps = arch_gaps(elevation, settings)
-    joint = _usual_joint(find_gaps(elevation, settings)) if gaps else _USUAL_JOINT
+    joint = _usual_joint(find_gaps(elevation, settings)) if gaps else JOINT
     for gap in gaps:
         left, right = gap.left.block.code, gap.right.block.code
         before = left
@@ -191,7 +191,7 @@ def _arch_notes(gap: ArchGap, number: int) -> tuple[str, ...]:
 
 
 def _usual_joint(gaps: Gaps) -> float:
-    return float(np.median(gaps.joints)) if len(gaps.joints) else _USUAL_JOINT
+    return float(np.median(gaps.joints)) if len(gaps.joints) else JOINT
 
 
 def _sigma(left: FlatStone, right: FlatStone) -> float:

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+from survey.conventions import LARGELY, SMALL_STONE
+from survey.unseen.core.settings import MAX_JOINT
+
 
 @dataclass(frozen=True)
 class MissingSettings:
@@ -16,8 +19,8 @@ class MissingSettings:
     max_courses : largest height of a hole, in courses; a higher one is an opening
     """
 
-    max_joint: float = 0.06
-    min_length: float = 0.15
-    covered: float = 0.7
+    max_joint: float = MAX_JOINT
+    min_length: float = SMALL_STONE
+    covered: float = LARGELY
     max_stones: int = 3
     max_courses: int = 2

@@ -3,6 +3,7 @@
 Coordinates (s, t): s along the facade to the right as seen from outside, t up, metres.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,13 +11,14 @@ from functools import cached_property
 import numpy as np
 
 from survey.arrays import Array
+from survey.conventions import PARALLEL, STEEPEST, STONE
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.faces.neighbours import Neighbours
 from survey.quality.facades import WallPlane, find_facades
 
-_FACING = float(np.cos(np.radians(50.0)))  # cosine of 50°: largest angle of a side from its direction
-_NEARLY = float(np.cos(np.radians(12.0)))  # cosine of 12°: largest turn of a side by wear
-_LAYER = 0.5  # metres: least distance of two walls that face the same way
+_FACING = math.cos(STEEPEST)  # largest angle of a side from its direction
+_NEARLY = math.cos(PARALLEL)  # largest turn of a side by wear
+_LAYER = STONE  # metres: least distance of two walls that face the same way
 
 
 @dataclass(frozen=True)

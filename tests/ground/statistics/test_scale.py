@@ -20,7 +20,7 @@ def test_scale_is_that_of_the_normal_values(wild: int) -> None:
 
 def test_of_none_and_of_one_value_there_is_no_scatter() -> None:
     assert deviation(np.zeros(0)) == 0.0
-    assert spread(np.array([3.0])) == pytest.approx(3.0 / math.sqrt(0.9113))
+    assert spread(np.array([3.0])) == pytest.approx(3.0 / math.sqrt(0.911256))
     assert scatter_beyond(np.zeros(0), np.zeros(0)) == (0.0, 0)
 
 

@@ -77,7 +77,7 @@ def test_a_cloud_that_is_not_understood_is_refused(tmp_path, text, message):
 
 
 def test_a_later_piece_of_another_width_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("survey.clouds.points.text._LINES", 3)
+    monkeypatch.setattr("survey.clouds.points.text.LINES", 3)
     path = tmp_path / "cloud.txt"
     path.write_text(rows("{x} {y} {z} 7") + "1 23 4\n", encoding="utf-8")
     with pytest.raises(SurveyError, match=r":4: '1 23 4' is not a point like the others"):

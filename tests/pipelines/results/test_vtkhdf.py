@@ -29,7 +29,7 @@ STONES, CONTACTS = 0, 1
 @pytest.fixture(autouse=True)
 def every_frame(monkeypatch):
     """Frames of these scenes come so fast that most would wait."""
-    monkeypatch.setattr(vtkhdf, "_SHARE", np.inf)
+    monkeypatch.setattr(vtkhdf, "SHARE", np.inf)
 
 
 @pytest.fixture(scope="module")
@@ -150,14 +150,14 @@ def test_a_growing_file_can_be_read_after_each_frame_and_is_little_larger_than_w
 
 
 def test_frames_that_come_too_fast_wait(wall, tmp_path, monkeypatch):
-    monkeypatch.setattr(vtkhdf, "_SHARE", 1e-9)
+    monkeypatch.setattr(vtkhdf, "SHARE", 1e-9)
     path, frames = tmp_path / "results.vtkhdf", list(wall.frames[:3])
     growing = GrowingResults(path, wall.bodies, wall.scene.blocks, frames)
     for frame in wall.frames[3:5]:
         frames.append(frame)
         growing.update()
     assert len(Read(path).times) == 4
-    monkeypatch.setattr(vtkhdf, "_SHARE", np.inf)
+    monkeypatch.setattr(vtkhdf, "SHARE", np.inf)
     growing.update()
     same(Read(path), wall, wall.frames[:5])
 

@@ -20,7 +20,7 @@ def main():
     folder, steps, last, threads = Path(sys.argv[1]), *map(int, sys.argv[2:])
     # parts of few contacts, so that threads have something to do
     delassus._THREAD_BATCH = 100
-    unfinished._SHARE = np.inf
+    unfinished.SHARE = np.inf
     assert threads == numba.config.NUMBA_NUM_THREADS
     bed = pushed_bed(20, 10, steps, 20, 0.002)
     bed = replace(bed, solver=replace(bed.solver, threads=threads), frame_every=10)

@@ -66,8 +66,8 @@ SCENES = {
 @pytest.fixture(autouse=True)
 def every_checkpoint(monkeypatch):
     """Steps of these scenes are so fast that most checkpoints would be left out."""
-    monkeypatch.setattr(unfinished, "_SHARE", np.inf)
-    monkeypatch.setattr(vtkhdf, "_SHARE", np.inf)
+    monkeypatch.setattr(unfinished, "SHARE", np.inf)
+    monkeypatch.setattr(vtkhdf, "SHARE", np.inf)
 
 
 def written(place, text, name="scene.toml"):

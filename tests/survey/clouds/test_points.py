@@ -135,7 +135,7 @@ def lines(separator=" ", comma=False, end="\n", head="", more=""):
     ],
 )
 def test_texts_of_points(name, content, tmp_path, monkeypatch):
-    monkeypatch.setattr(text, "_LINES", 50)
+    monkeypatch.setattr(text, "LINES", 50)
     (tmp_path / name).write_text(content, encoding="utf-8", newline="")
     np.testing.assert_allclose(read(tmp_path / name), POINTS, atol=6e-5)
 

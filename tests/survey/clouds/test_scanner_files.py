@@ -39,7 +39,7 @@ def ptx_file(path, points, turn=TURN, shift=SHIFT, columns=None, colours=None):
 
 
 def test_ptx_moves_its_scans_and_leaves_out_what_did_not_come_back(tmp_path, monkeypatch):
-    monkeypatch.setattr(ptx, "_LINES", 50)
+    monkeypatch.setattr(ptx, "LINES", 50)
     path = ptx_file(tmp_path / "a.ptx", POINTS, colours=COLOURS)
     places, tints = read(path, colours=True)
     np.testing.assert_allclose(places, np.tile(POINTS @ TURN + SHIFT, (2, 1)), atol=1e-8)

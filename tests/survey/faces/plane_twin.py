@@ -9,9 +9,9 @@ import numpy as np
 
 from survey.arrays import Array, Bools
 
-LIMIT = 3.29
+LIMIT = 3.2905267314919255
 EROSION = 0.03
-GRAZING = 0.17
+GRAZING = math.sin(math.radians(10.0))
 TILT = math.radians(10.0)
 
 # Reference case P01, "TLS plane, exact checkerboard set" (closed form): x in {-3,-1,1,3},

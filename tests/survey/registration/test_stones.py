@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ground.errors import GeometryError, SurveyError
+from survey.conventions import TRIALS
 from survey.extrusion.extrusion import SurveyedBlock
 from survey.formats.reading import open_survey
 from survey.records.survey import (
@@ -22,7 +23,7 @@ from survey.records.survey import (
     SurveyHead,
     SurveyStream,
 )
-from survey.registration.stones import _SAMPLE, survey_stones
+from survey.registration.stones import survey_stones
 
 RULES = (DepthRule(None, 0.4, 0.05, "thickness", 2),)
 OBSERVER = Station("observer", np.array([2.0, -9.0, 1.5]), 3)
@@ -297,8 +298,8 @@ def test_stones_come_while_the_file_is_being_read():
     next(stones)
     assert taken == [0]
     taken.clear()
-    next(survey_stones(survey(items(_SAMPLE + 9))).stones)
-    assert len(taken) == _SAMPLE
+    next(survey_stones(survey(items(TRIALS + 9))).stones)
+    assert len(taken) == TRIALS
 
 
 def test_a_file_of_two_frames_is_read_whole(tmp_path):

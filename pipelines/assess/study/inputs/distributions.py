@@ -13,10 +13,10 @@ from scipy.stats import norm
 from ground.errors import SceneError
 from mechanics.arrays import Array
 from pipelines.assess.study.settings import Shape
+from survey.conventions import VANISHING
 
-_LEAST_EIGENVALUE = 1e-10
+_LEAST_EIGENVALUE = VANISHING
 """Least eigenvalue of a matrix of correlations that counts as positive: rounding of its entries leaves 10⁻¹⁵ [-]."""
-_SYMMETRIC = 1e-12  # largest difference of a correlation from its mirror image [-]
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,8 @@ def correlation_root(matrix: Array) -> Array:
            [0.6, 0.8]])
     """
     if (
-        np.abs(matrix - matrix.T).max(initial=0.0) > _SYMMETRIC
-        or np.abs(np.diag(matrix) - 1.0).max(initial=0.0) > _SYMMETRIC
+        np.abs(matrix - matrix.T).max(initial=0.0) > VANISHING
+        or np.abs(np.diag(matrix) - 1.0).max(initial=0.0) > VANISHING
     ):
         raise SceneError(
             "the matrix of correlations is not symmetric with ones on its diagonal",

@@ -12,8 +12,6 @@ from scipy.stats import beta, norm, t
 
 from mechanics.arrays import Array
 
-_FEW = 1e-300  # least probability whose reliability index is computed
-
 
 @dataclass(frozen=True)
 class Estimate:
@@ -68,7 +66,7 @@ def reliability_index(probability: float) -> float:
     >>> round(reliability_index(3.907e-3), 3)
     2.66
     """
-    return float(-norm.ppf(min(max(probability, _FEW), 1.0 - 1e-16)))
+    return float(-norm.ppf(min(max(probability, float(np.finfo(np.float64).tiny)), 1.0 - 1e-16)))
 
 
 def probability(states: Array, confidence: float) -> Probability:

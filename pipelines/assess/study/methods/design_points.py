@@ -17,21 +17,22 @@ from scipy.stats import norm
 
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate, Failure
+from survey.conventions import MANY, MOST, NOTICEABLE, PER_MILLE, SIGNIFICANT, TENTH
 
-_STILL = 1e-3
+_STILL = PER_MILLE
 """Change of the point at which it stands, and g over its change along one unit, at which it is zero [-].
 
 P changes by β times as much, less than a hundredth.
 """
-_MAX_SAMPLES = 30  # samples of a search
+_MAX_SAMPLES = MANY  # samples of a search
 _STARTS = 8
 """Unknowns along which further searches begin, at most."""
-_OUT = 3.0  # distance of their starts from the mean [-]
-_BELOW = 0.5
+_OUT = SIGNIFICANT  # distance of their starts from the mean [-]
+_BELOW = MOST
 """Distance of g below the tangent, in standard deviations, from which another way to fail is sought [-]."""
-_DISTINCT = 0.1
+_DISTINCT = TENTH
 """Distance from which two design points are two [-]."""
-_RELEVANT = 2.0
+_RELEVANT = NOTICEABLE
 """Excess of β over the least up to which a design point counts: beyond, P is less than a hundredth of the largest."""
 
 

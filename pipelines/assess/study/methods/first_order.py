@@ -6,17 +6,18 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.assess.study.methods.failure import Evaluate
+from survey.conventions import PER_MILLE, TENTH
 
 _MOST = 8
 """Unknowns that the linear prediction is tried along, the largest first."""
 
-NOT_LINEAR = 0.1
+NOT_LINEAR = TENTH
 """Departure from the linear prediction at one standard deviation, over that of the quantity, from which it is told [-].
 
 A tenth shifts a mean by a twentieth of the standard deviation at most.
 """
 
-_BESIDE = 1e-3
+_BESIDE = PER_MILLE
 """Distance from the mean at which derivatives of either side are taken, in standard deviations [-].
 
 A second mechanism within 10⁻⁶ of a limit load takes over nearer than that: λ moves by 5·10⁻⁵ of itself.

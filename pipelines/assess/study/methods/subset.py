@@ -13,8 +13,9 @@ from scipy.stats import norm
 from mechanics.arrays import Array, Bools, Ints
 from pipelines.assess.study.methods.counting import Probability
 from pipelines.assess.study.methods.failure import Evaluate, Failure
+from survey.conventions import TENTH
 
-_SHARE = 0.1  # of the samples of a level from which the next begins [-]
+_SHARE = TENTH  # of the samples of a level from which the next begins [-]
 _CORRELATION = 0.8
 """Correlation of a move with the point before: less is refused too often, more moves too little [-]."""
 _LEVELS = 12  # at most: P of 10⁻¹²

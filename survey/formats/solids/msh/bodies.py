@@ -1,7 +1,8 @@
 """Boundary of each volume of a Gmsh mesh."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,21 @@ _TETRA = _sides("021 013 123 032")
 _HEXA = _sides("0321 4567 0154 1265 2376 3047")
 _WEDGE = _sides("021 345 0143 1254 2035")
 _PYRAMID = _sides("0321 014 124 234 304")
-_FACES = {  # of Gmsh's types of the first and second order, their corners counter-clockwise seen from outside
-    **dict.fromkeys((4, 11), _TETRA),
-    **dict.fromkeys((5, 12, 17), _HEXA),
-    **dict.fromkeys((6, 13, 18), _WEDGE),
-    **dict.fromkeys((7, 14, 19), _PYRAMID),
+
+
+class _Type(IntEnum):
+    """Gmsh's numbers of elements of the first and second order, by their nodes."""
+
+    TETRA_4, HEXA_8, WEDGE_6, PYRAMID_5 = 4, 5, 6, 7
+    TETRA_10, HEXA_27, WEDGE_18, PYRAMID_14 = 11, 12, 13, 14
+    HEXA_20, WEDGE_15, PYRAMID_13 = 17, 18, 19
+
+
+_FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {  # their corners counter-clockwise seen from outside
+    **dict.fromkeys((_Type.TETRA_4, _Type.TETRA_10), _TETRA),
+    **dict.fromkeys((_Type.HEXA_8, _Type.HEXA_20, _Type.HEXA_27), _HEXA),
+    **dict.fromkeys((_Type.WEDGE_6, _Type.WEDGE_15, _Type.WEDGE_18), _WEDGE),
+    **dict.fromkeys((_Type.PYRAMID_5, _Type.PYRAMID_13, _Type.PYRAMID_14), _PYRAMID),
 }
 
 Cells = list[tuple[int, Ints]]

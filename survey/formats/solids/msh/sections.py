@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ground.tables.numbers import shown, unreadable
-from survey.arrays import Array, Ints
+from survey.arrays import Array, Ints, no_places
 from survey.formats.solids.msh.numbers import MshNumbers
 
 _COUNTS = "2 3 4 4 8 6 5 3 6 9 10 27 18 14 1 8 20 15 13 9 10 12 15 15 21 4 5 6 20 35"
@@ -49,7 +49,7 @@ class MshFile:
     """
 
     path: Path
-    points: Array = field(default_factory=lambda: np.empty((0, 3)))
+    points: Array = field(default_factory=no_places)
     elements: list[Elements] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
     _tags: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of the points, ascending

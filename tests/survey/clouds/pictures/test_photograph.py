@@ -8,7 +8,7 @@ from PIL import Image
 
 from ground.errors import SurveyError, UsageError
 from survey.clouds.pictures.photograph import open_photograph
-from survey.clouds.views.orthophoto import STEP
+from survey.clouds.views.orthophoto import DEPTH_STEP
 
 SHAPE = (20, 30)
 
@@ -96,7 +96,7 @@ def test_the_depth_map_beside_an_orthophoto_is_taken_with_its_lowest_depth(pictu
     write_depth(tmp_path)
     depth = open_photograph(picture).depth
     assert depth[2, 5] == pytest.approx(-0.2)
-    assert depth[15, 5] == pytest.approx(-0.2 + 300 * STEP)
+    assert depth[15, 5] == pytest.approx(-0.2 + 300 * DEPTH_STEP)
     assert np.isnan(depth[2, 29])  # the number 0 is no depth
     assert np.isfinite(depth[:, 8]).all()  # but a gap of a pixel is closed
 
@@ -105,7 +105,7 @@ def test_a_depth_map_of_another_program_is_only_taken_if_it_is_named(picture, tm
     path = write_depth(tmp_path, index=False)
     assert open_photograph(picture).depth is None
     depth = open_photograph(picture, depth=path).depth
-    assert depth[15, 5] == pytest.approx(300 * STEP)
+    assert depth[15, 5] == pytest.approx(300 * DEPTH_STEP)
 
 
 def test_an_index_without_its_lowest_depth_is_an_error(picture, tmp_path):

@@ -6,7 +6,7 @@ from PIL import Image
 
 from ground.errors import SurveyError, UsageError
 from survey.clouds.points.chunks import Chunk, PointCloud
-from survey.clouds.views.orthophoto import STEP, find_wall, paint_wall, write_picture
+from survey.clouds.views.orthophoto import DEPTH_STEP, find_wall, paint_wall, write_picture
 from survey.clouds.views.sections import Section, contour, join, section_plane
 from survey.clouds.wall import Wall, read_wall, wall_lines
 from survey.clouds.world import world_of
@@ -112,7 +112,7 @@ def test_an_orthophoto_lies_where_its_world_file_says(tmp_path):
     np.testing.assert_allclose(flat.min(axis=0), ring[0], atol=0.012)
     np.testing.assert_allclose(flat.max(axis=0), ring[2], atol=0.012)
     numbers = np.asarray(Image.open(tmp_path / "depth.png")).astype(float)
-    depth = lowest + (numbers[row, column] - 1.0) * STEP
+    depth = lowest + (numbers[row, column] - 1.0) * DEPTH_STEP
     assert abs(np.median(depth) - scans.RELIEF[4]) < 0.0005
     assert picture.coloured
 

@@ -10,7 +10,7 @@ from survey.faces._kernels.planes import Points, leverages, weighted_plane
 from survey.faces._kernels.robust_fit import fit_face
 from survey.faces._kernels.shapes import fit_columns, fit_two_planes, grow_columns, truncated_sum
 from survey.faces._kernels.triples import beside_the_rest, search_triples, smallest
-from tests.survey.faces.plane_twin import accepted_points, compact, plane_of, triple_planes
+from tests.survey.faces.plane_twin import LIMIT, accepted_points, compact, plane_of, triple_planes
 
 SIGMA = 0.002
 
@@ -86,8 +86,8 @@ def test_triples_of_least_median_and_least_truncated_squares() -> None:
         distances = np.abs(distances)
         medians = np.sort(distances, axis=1)[:, size - 1]
         assert np.sort(found[0])[size - 1] == pytest.approx(medians.min(), rel=1e-9)
-        sums = np.minimum(distances, 3.29) ** 2
-        assert (np.minimum(found[1], 3.29) ** 2).sum() == pytest.approx(sums.sum(axis=1).min(), rel=1e-9)
+        sums = np.minimum(distances, LIMIT) ** 2
+        assert (np.minimum(found[1], LIMIT) ** 2).sum() == pytest.approx(sums.sum(axis=1).min(), rel=1e-9)
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -287,7 +287,7 @@ def test_the_scatter_of_differences_about_their_median(slope: float) -> None:
     tau, _, count = _scatter([beds])
     wider = len(steps) / (len(steps) - 1.0)
     assert count == len(steps)
-    assert tau == pytest.approx(math.sqrt(2.5e-6 * wider / (2.0 * 0.9113) - 1e-10), rel=1e-6)
+    assert tau == pytest.approx(math.sqrt(2.5e-6 * wider / (2.0 * 0.9112563609) - 1e-10), rel=1e-6)
 
 
 def test_no_stone_of_a_steep_bed_is_odd() -> None:

@@ -5,13 +5,16 @@ that of a stone. Both are in SI units, and come from handbooks of building stone
 """
 
 import math
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 
 import numpy as np
 
-from ground.tables.columns import UNITS
+from ground.units import CENTI, FOOT, GIGA, GRAVITY, INCH, KILO, LENGTHS, MEGA, MILLI, POUND, PSI
 from survey.arrays import Array
+from survey.conventions import SOME
 
 
 @dataclass(frozen=True)
@@ -44,65 +47,31 @@ def _tangent(degrees: float) -> float:
     return math.tan(math.radians(degrees)) if 0.0 < degrees < 90.0 else math.nan
 
 
-LENGTH = Range(
-    "length",
-    "m",
-    usual=(0.02, 8.0),  # from a tessera or a chip in a joint to the architraves of the largest temples
-    possible=(0.002, 30.0),  # from gravel to beyond the largest stones ever quarried
-    reason="the longest ever quarried, at Baalbek, has 20.5 m",
-    units=(
-        ("millimetres", _scaled(1e-3)),
-        ("centimetres", _scaled(1e-2)),
-        ("feet", _scaled(0.3048)),
-        ("inches", _scaled(0.0254)),
-    ),
-)
+def _range(quantity: str, unit: str, **units: float | Callable[[float], float]) -> Range:
+    """Return the range of a quantity of `plausible.toml`, with other units by name: their size, or a conversion."""
+    table = _RANGES[quantity]
+    others = ((name, _scaled(size) if isinstance(size, float) else size) for name, size in units.items())
+    return Range(
+        quantity, unit, tuple(table["usual"]), tuple(table["possible"]), table["reason"], tuple(others)
+    )
 
-DENSITY = Range(
+
+_RANGES = tomllib.loads(files(__package__).joinpath("plausible.toml").read_text(encoding="utf-8"))
+LENGTH = _range("length", "m", millimetres=MILLI, centimetres=CENTI, feet=FOOT, inches=INCH)
+DENSITY = _range(
     "density",
     "kg/m³",
-    usual=(1000.0, 3300.0),  # from tuff and adobe to basalt and gabbro
-    possible=(200.0, 8000.0),  # from the lightest pumice to iron ore, with room for clamps of metal
-    reason="tuff has 1000 to 1800, limestone and sandstone 1900 to 2700, basalt up to 3300",
-    units=(("g/cm³ (t/m³)", _scaled(1e3)), ("kN/m³", _scaled(1e3 / 9.81)), ("lb/ft³", _scaled(16.0185))),
+    **{"g/cm³ (t/m³)": KILO, "kN/m³": KILO / GRAVITY, "lb/ft³": POUND / (FOOT * FOOT * FOOT)},
 )
-
-YOUNG = Range(
-    "young",
-    "Pa",
-    usual=(5e7, 1.2e11),  # from adobe to dense basalt and quartzite
-    possible=(1e6, 1.2e12),  # from stiff clay to diamond
-    reason="adobe has 0.05 to 1 GPa, soft limestone and tuff 1 to 15, marble and granite 30 to 80",
-    units=(
-        ("GPa", _scaled(1e9)),
-        ("MPa (N/mm²)", _scaled(1e6)),
-        ("kPa", _scaled(1e3)),
-        ("psi", _scaled(6894.76)),
-    ),
-)
-
-POISSON = Range(
-    "poisson",
-    "",
-    usual=(0.0, 0.4),  # dry porous stone to clay-rich stone
-    possible=(0.0, 0.49),  # rock does not thicken when it is pulled, nor keep its volume as rubber does
-    reason="rocks have 0.1 to 0.35",
-)
-
-FRICTION = Range(
-    "friction",
-    "",
-    usual=(0.0, 1.5),  # from a joint without any friction, as a thought experiment, to 56°
-    possible=(0.0, 10.0),  # beyond the 80° of the roughest unworn rock joints, as a stand-in for no sliding
-    reason="dry joints of stone have 0.4 to 0.8, the roughest fractures of rock 5.7 (80°)",
-    units=(("degrees", _tangent), ("per cent", _scaled(1e-2))),
-)
+YOUNG = _range("young", "Pa", **{"GPa": GIGA, "MPa (N/mm²)": MEGA, "kPa": KILO, "psi": PSI})
+POISSON = _range("poisson", "")
+FRICTION = _range("friction", "", degrees=_tangent, **{"per cent": CENTI})
 
 
 _METRIC = ("mm", "cm")
-_UNITS = {name: UNITS[name] for name in (*_METRIC, "ft", "in")}
+_UNITS = {name: LENGTHS[name] for name in (*_METRIC, "ft", "in")}
 _MANY = 1000  # stones of which it is asked on what they stand
-_LOWER = 0.25  # of its height: how much lower the centre of the stones is on which another stands [-]
+_LOWER = SOME  # of its height: how much lower the centre of the stones is on which another stands [-]
 
 
 def lies_on_its_side(boxes: Array) -> bool:

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from survey.quality.plausible import (
+from survey.records.plausible import (
     DENSITY,
     FRICTION,
     LENGTH,
