@@ -79,7 +79,7 @@ def propose_missing(
         if best is None:
             continue
         out[box][best[1]] = following
-        waiting += [(part, _within(box, out[box] == part)) for part in (number, following)]
+        waiting += [(piece, _within(box, out[box] == piece)) for piece in (number, following)]
         following += 1
     return out
 

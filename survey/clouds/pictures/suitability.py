@@ -136,10 +136,10 @@ def _directions(rings: Sequence[Array], upright: bool) -> tuple[float, float]:
     angle = np.degrees(np.arctan2(side[:, 1], side[:, 0]))
     angle = (angle + 90.0) % 180.0 - 90.0
     weight = np.linalg.norm(side, axis=1)
-    near = np.abs(angle) < 25.0
-    if np.count_nonzero(near) < 8:
+    aligned = np.abs(angle) < 25.0
+    if np.count_nonzero(aligned) < 8:
         return 0.0, 0.0
-    use = near & (weight > 0.5 * np.median(weight[near]))  # no bevels
+    use = aligned & (weight > 0.5 * np.median(weight[aligned]))  # no bevels
     middle = 0.5 * (ends[use, :2] + ends[use, 2:])
     span = np.ptp(middle, axis=0)
     terms = np.column_stack([np.ones(use.sum()), (middle - middle.mean(axis=0)) / np.maximum(span, 1e-9)])
