@@ -12,11 +12,11 @@ from survey.arrays import Array
 from survey.clouds.extras import optional
 from survey.clouds.points.chunks import CHUNK, Chunk, PointCloud
 
-_HEAD, _LEAST_HEAD = (
-    255,
-    227,
-)  # bytes of the head that say how many points and records there are; before version 1.4
-_RECORD, _EXTENDED = 54, 60  # bytes of the shortest variable-length record, and of an extended one
+# sizes of structures of the format [bytes]: the head before version 1.4, what 1.4 adds up to the number of points, and
+# the heads of a variable-length record and of an extended one
+_LEAST_HEAD = struct.calcsize("<4sHHIHH8sBB32s32sHHHIIBHI5I12d")
+_HEAD = _LEAST_HEAD + struct.calcsize("<QQIQ")
+_RECORD, _EXTENDED = struct.calcsize("<H16sHH32s"), struct.calcsize("<H16sHQ32s")
 _COMPRESSED = 0x80  # bit of the format of points in LAZ
 
 
