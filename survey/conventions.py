@@ -1,4 +1,7 @@
-"""Conventions of all rooms, each said once: what is beyond chance, most of a whole, alike, small or rounding."""
+"""Conventions of all rooms, each said once: what is beyond chance, most of a whole, alike, small or rounding.
+
+Compiled kernels hold them: after a change, remove `__pycache__/*.nbi`, by which numba knows its caches.
+"""
 
 import math
 from statistics import NormalDist
