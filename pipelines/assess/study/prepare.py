@@ -183,7 +183,7 @@ def _correlated(
                 if unknown.input == number and unknown.part == "common"
             ]
             if len(common) != 1:
-                name = inputs[number].name or inputs[number].type
+                name = inputs[number].name or str(inputs[number].type)
                 raise SceneError(
                     f"the input {name!r} has {len(common)} common unknowns, so its correlation has no meaning",
                     remedy="correlate inputs with one value each",
