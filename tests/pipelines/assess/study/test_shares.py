@@ -161,12 +161,11 @@ def test_what_changes_besides_tells_that_unknowns_cannot_be_told_apart():
 
 
 def told(**failure):
-    facts = {
+    return {
         "failure": {"above": False, "level": 0.3, "probability": 0.0123, "low": 0.01, "high": 0.015, "index": 2.25,
                     "index_low": 2.17, "index_high": 2.33} | failure,
         "quantity": "bound", "bound": True, "means": {}, "cautions": [], "actions": [],
     }  # fmt: skip
-    return facts
 
 
 def test_the_headline_has_the_probability_and_what_to_measure_next():
