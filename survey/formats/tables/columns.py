@@ -30,14 +30,8 @@ ALIASES: Mapping[str, Sequence[str]] = {
     "block": (
         *("block", "stone", "block id", "stone id", "stone no", "stone number", "stone code", "block code"),
         *(
-            "Stein",
-            "Steinnummer",
-            "Stein Nr",
-            "Quader",
-            "Stein ID",
-            "Steincode",
-            "Steinbezeichnung",
-            "Stein Bez",
+            *("Stein", "Steinnummer", "Stein Nr", "Quader", "Stein ID", "Steincode"),
+            *("Steinbezeichnung", "Stein Bez"),
         ),
         *("pierre", "bloc", "numéro de pierre", "n° pierre", "id pierre", "code pierre"),
         *("pietra", "blocco", "concio", "sasso", "numero pietra", "n pietra", "id pietra"),
@@ -71,11 +65,7 @@ ALIASES: Mapping[str, Sequence[str]] = {
         *("fonte profondità", "fuente profundidad"),
     ),
     "depth_origin": (
-        "depth origin",
-        "origin depth",
-        "Herkunft Tiefe",
-        "Tiefe Herkunft",
-        "origine profondeur",
+        *("depth origin", "origin depth", "Herkunft Tiefe", "Tiefe Herkunft", "origine profondeur"),
     ),
     "zone": (
         *("zone", "part", "sector", "bay", "wall", "facade", "Bereich", "Zone", "Bauteil", "Wand"),
@@ -92,14 +82,7 @@ ALIASES: Mapping[str, Sequence[str]] = {
         *("codice", "descrizione", "código", "descripción", "codigo punto"),
     ),
     "outline": (
-        "wkt",
-        "wkt geom",
-        "geometry",
-        "geom",
-        "the geom",
-        "outline",
-        "shape wkt",
-        "Umriss",
+        *("wkt", "wkt geom", "geometry", "geom", "the geom", "outline", "shape wkt", "Umriss"),
         "contour",
     ),
 }
