@@ -19,16 +19,8 @@ from archmodel.tables.registered import RegisteredKind
 from archmodel.tables.structures import Structure
 
 _READING_ORDER = (
-    "entries",
-    "registered",
-    "surveys",
-    "entities",
-    "structures",
-    "relations",
-    "knowledge",
-    "terms",
-    "opinions",
-    "runs",
+    *("entries", "registered", "surveys", "entities", "structures", "relations", "knowledge", "terms"),
+    *("opinions", "runs"),
 )
 """Modules of `archmodel.tables`, in the order in which a reader wants their tables, as far as references allow."""
 

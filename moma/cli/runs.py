@@ -12,16 +12,8 @@ from moma.cli.console import reporting, say
 from moma.cli.options import Common, Json, Verbose, check_ending
 
 _LIST = (
-    "run",
-    "scene",
-    "stored_at",
-    "outcome",
-    "stones",
-    "contacts",
-    "natural_map",
-    "balance",
-    "reaction",
-    "wall",
+    *("run", "scene", "stored_at", "outcome", "stones", "contacts", "natural_map", "balance"),
+    *("reaction", "wall"),
 )
 _MORE = ("penetration", "energy")
 _STAGES = ("name", "outcome", "stones", "laid", "removed", "held", "weight", "reaction", "bed", "time")

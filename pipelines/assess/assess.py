@@ -59,19 +59,8 @@ INDEX = "assessment.json"
 """Index of the results of an assessment."""
 
 JOINT_COLUMNS = (
-    "first",
-    "second",
-    "x",
-    "y",
-    "z",
-    "force_normal",
-    "force_shear",
-    "place_x",
-    "place_y",
-    "place_z",
-    "kern",
-    "edge",
-    "friction_use",
+    *("first", "second", "x", "y", "z", "force_normal", "force_shear", "place_x", "place_y", "place_z"),
+    *("kern", "edge", "friction_use"),
 )
 """Columns of forces-N.csv: stones, centroid [m], resultant [N], where it meets the joint [m], kern, edge, use [-]."""
 

@@ -21,16 +21,8 @@ if TYPE_CHECKING:
 _WIDE = 10.0  # of a figure [inch]
 _ROW = 130  # characters in a line of a footnote
 _LAYERS = (
-    "#c9a26b",
-    "#8a3b12",
-    "#e3c78f",
-    "#5f5a4f",
-    "#6b7a2a",
-    "#d98c5f",
-    "#3f6f6b",
-    "#f2e6c9",
-    "#a3a08f",
-    "#b8860b",
+    *("#c9a26b", "#8a3b12", "#e3c78f", "#5f5a4f", "#6b7a2a", "#d98c5f", "#3f6f6b", "#f2e6c9"),
+    *("#a3a08f", "#b8860b"),
 )  # colours, from the base; more layers than these take them in turns
 _CELL = "#1f3fbf"  # colour of the disks of a cell among the layers
 _ARROWS = 600  # of velocities, at most

@@ -37,15 +37,8 @@ UNFINISHED_ASSESSMENT, UNFINISHED_DIAGNOSIS = "unfinished-assessment", "unfinish
 
 _INDEXES = (
     RUN_INDEX,
-    "check.json",
-    "cloud.json",
-    "survey.json",
-    "assessment.json",
-    "comparison.json",
-    "diagnosis.json",
-    "orientation.json",
-    "pushover.json",
-    "outlines.json",
+    *("check.json", "cloud.json", "survey.json", "assessment.json", "comparison.json"),
+    *("diagnosis.json", "orientation.json", "pushover.json", "outlines.json"),
 )  # their "files" list the files that MOMA wrote
 _UNFINISHED_RUNS = {
     UNFINISHED: (RUN_INDEX, "run"),

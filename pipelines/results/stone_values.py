@@ -15,14 +15,8 @@ from mechanics.results.result import BodyResult, Peaks, Result
 from mechanics.results.stress_values import volume_quantile
 
 _STRESSES = (
-    "principal_tension",
-    "principal_compression",
-    "mean_pressure",
-    "tension_zone",
-    "overstressed_zone",
-    "utilisation",
-    "utilisation_tension",
-    "utilisation_compression",
+    *("principal_tension", "principal_compression", "mean_pressure", "tension_zone"),
+    *("overstressed_zone", "utilisation", "utilisation_tension", "utilisation_compression"),
 )
 
 _OF_WHOLE_JOINTS = ("pressure_mean", "pressure_max", "kern")

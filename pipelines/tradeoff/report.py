@@ -20,11 +20,7 @@ from pipelines.tradeoff.store import INDEX, Measured, Status, Store
 from pipelines.tuning.overlay import overlay_record, scene_lines
 
 MAIN = (
-    "von_mises_p99",
-    "von_mises_max",
-    "stone_von_mises_mean",
-    "support_reactions",
-    "joint_forces",
+    *("von_mises_p99", "von_mises_max", "stone_von_mises_mean", "support_reactions", "joint_forces"),
     "displacement",
 )
 """Quantities that table and plot show where they are known."""

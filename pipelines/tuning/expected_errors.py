@@ -22,14 +22,8 @@ TYPICAL = ("stone_von_mises_p99",)
 """Quantities whose errors hardly vary between structures: a typical error is given."""
 
 BOUNDS = (
-    "stone_von_mises_mean",
-    "von_mises_mean",
-    "von_mises_p99",
-    "joint_forces",
-    "support_reactions",
-    "displacement",
-    "stone_displacement",
-    "settlement",
+    *("stone_von_mises_mean", "von_mises_mean", "von_mises_p99", "joint_forces", "support_reactions"),
+    *("displacement", "stone_displacement", "settlement"),
 )
 """Quantities whose errors may cancel, or whose forces are undetermined: an upper bound is given."""
 

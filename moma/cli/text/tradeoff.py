@@ -9,11 +9,7 @@ if TYPE_CHECKING:
     from pipelines.tradeoff.study import TradeReport
 
 _COLUMNS = (
-    "von_mises_p99",
-    "von_mises_max",
-    "stone_von_mises_mean",
-    "support_reactions",
-    "joint_forces",
+    *("von_mises_p99", "von_mises_max", "stone_von_mises_mean", "support_reactions", "joint_forces"),
     "displacement",
 )
 

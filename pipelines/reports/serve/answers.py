@@ -19,14 +19,7 @@ from pipelines.reports.view import as_known_text, database_model, view_page
 from pipelines.results.table_csv import csv_text
 
 COLUMNS = (
-    "code",
-    "kind",
-    "course",
-    "zone",
-    "phase",
-    "depth",
-    "depth_origin",
-    "von_mises_p99",
+    *("code", "kind", "course", "zone", "phase", "depth", "depth_origin", "von_mises_p99"),
     "displacement_max",
 )
 """Attributes of a table where a request names none."""

@@ -52,10 +52,7 @@ _USUAL = (
     *(f"{name}{{kind}}{role}" for name in ("{course:2}{number:2}", "{block}") for role in (" {role?}", "")),
     "{block} {role?}",
     *(
-        "{block} {kind}",
-        "{kind} {block} {role}",
-        "{kind} {block}",
-        "{block}:{role} {*}",
+        *("{block} {kind}", "{kind} {block} {role}", "{kind} {block}", "{block}:{role} {*}"),
         "{block} {role} {*}",
     ),
     *("{block} {kind} {role} {*}", "{block}{role}", "{block}{role} {*}", "{block}", "{block} {*}"),
