@@ -25,31 +25,20 @@ COLLECTED = pytest.StashKey[frozenset[str]]()
 """All tests that a run collected, before any were left out."""
 
 KEPT = (
-    "tests/test_",
-    "tests/ratchets/",
-    "tests/validation/wild/",
-    "tests/validation/one_answer/",
+    *("tests/test_", "tests/ratchets/", "tests/validation/wild/", "tests/validation/one_answer/"),
     "tests/docs/",
 )
 """Rules of the source, scenes that were found to break a verdict, and documented commands: they run in every suite."""
 
 GUARDS = (
-    "tests/archmodel/database/",
-    "tests/archmodel/describe/test_history.py",
-    "tests/archmodel/exchange/test_round_trip.py",
-    "tests/archmodel/migrations/",
-    "tests/archmodel/store/",
-    "tests/mechanics/dynamics/test_resuming.py",
-    "tests/mechanics/planar/test_resuming.py",
-    "tests/moma/cli/test_database.py",
-    "tests/moma/cli/test_read_only.py",
-    "tests/pipelines/ingest/test_crashes.py",
-    "tests/pipelines/ingest/test_exchange.py",
-    "tests/pipelines/results/test_folder.py",
-    "tests/pipelines/results/test_vtkhdf.py",
-    "tests/pipelines/run/test_record.py",
-    "tests/pipelines/run/test_unfinished.py",
-    "tests/validation/elastic/test_laws.py",
+    *("tests/archmodel/database/", "tests/archmodel/describe/test_history.py"),
+    *("tests/archmodel/exchange/test_round_trip.py", "tests/archmodel/migrations/"),
+    *("tests/archmodel/store/", "tests/mechanics/dynamics/test_resuming.py"),
+    *("tests/mechanics/planar/test_resuming.py", "tests/moma/cli/test_database.py"),
+    *("tests/moma/cli/test_read_only.py", "tests/pipelines/ingest/test_crashes.py"),
+    *("tests/pipelines/ingest/test_exchange.py", "tests/pipelines/results/test_folder.py"),
+    *("tests/pipelines/results/test_vtkhdf.py", "tests/pipelines/run/test_record.py"),
+    *("tests/pipelines/run/test_unfinished.py", "tests/validation/elastic/test_laws.py"),
 )
 """Files and folders of tests that guard what a user has: kills, locks, resumption, migration, files that come back."""
 

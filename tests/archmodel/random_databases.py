@@ -19,23 +19,11 @@ from archmodel.tables.layout import SchemaVersion
 
 TEXTS = (
     *(
-        "",
-        " ",
-        "null",
-        "NaN",
-        "0",
-        "façade · 2nd campaign",
-        "日本の石",
-        "🏰\u200d",
-        "a\tb\nc\r\n",
+        *("", " ", "null", "NaN", "0", "façade · 2nd campaign", "日本の石", "🏰\u200d", "a\tb\nc\r\n"),
         '"quoted" \\ back\\"',
     ),
     *(
-        "</script>",
-        "'; DROP TABLE entity; --",
-        "\u2028\u2029\ufeff",
-        "\x7f\x01",
-        "e\u0301",
+        *("</script>", "'; DROP TABLE entity; --", "\u2028\u2029\ufeff", "\x7f\x01", "e\u0301"),
         "\U0010ffff",
         "x" * 5000,
     ),

@@ -20,15 +20,7 @@ from pipelines.geology.file import read_geology
 from tests.paths import ROOT
 
 SIDES = (
-    "step",
-    "first",
-    "total",
-    "sweeps",
-    "eta",
-    "penetration",
-    "drift",
-    "displacement",
-    "balance",
+    *("step", "first", "total", "sweeps", "eta", "penetration", "drift", "displacement", "balance"),
     "reaction",
 )
 

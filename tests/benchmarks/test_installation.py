@@ -24,18 +24,8 @@ def test_the_base_has_what_was_asked_for_and_nothing_of_the_extras():
 def test_the_matrix_has_every_engine_and_sample():
     words = " ".join(MATRIX)
     for name in (
-        "arch",
-        "window",
-        "wall",
-        "tower",
-        "rubble-wall",
-        "assess",
-        "diagnose",
-        "pushover",
-        "trade",
-        "check",
-        "propose infill --record",
-        "biaxial",
+        *("arch", "window", "wall", "tower", "rubble-wall", "assess", "diagnose", "pushover", "trade"),
+        *("check", "propose infill --record", "biaxial"),
     ):
         assert name in words
 

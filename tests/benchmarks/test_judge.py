@@ -34,13 +34,7 @@ def test_a_brick_in_balance_has_no_error():
     verdict = Judge(SCENE, STEP, THETA)(at_rest())
     assert verdict.contacts == 4
     for measure in (
-        "eta",
-        "eta_first",
-        "penetration",
-        "drift",
-        "displacement",
-        "balance",
-        "reaction",
+        *("eta", "eta_first", "penetration", "drift", "displacement", "balance", "reaction"),
         "momentum",
     ):
         assert getattr(verdict, measure) == pytest.approx(0.0, abs=1e-12), measure

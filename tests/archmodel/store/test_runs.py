@@ -171,12 +171,7 @@ def test_every_column_of_a_joint_has_its_own_number(filled: Database) -> None:
         assert (row.first.code, row.second.code, row.parted) == ("V2", "V3", True)
         assert (row.x, row.y, row.z, row.nx, row.ny, row.nz) == (4.0, 5.0, 6.0, 0.6, 0.0, 0.8)
         names = (
-            "area",
-            "force_normal",
-            "force_shear",
-            "pressure_mean",
-            "pressure_max",
-            "kern",
+            *("area", "force_normal", "force_shear", "pressure_mean", "pressure_max", "kern"),
             "friction_use",
         )
         names += ("slipping", "open", "gap", "opening", "sliding")

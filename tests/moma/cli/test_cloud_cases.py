@@ -17,26 +17,12 @@ CASE = ROOT.parent / "shared/cases/photographs/text-columns"
 NAMED = ["yxz.csv", "hoch.txt", "id.csv", "rgb_first.csv", "intensity_first.txt", "quoted.csv"]
 READ = [
     *(
-        "be.ply",
-        "cc.txt",
-        "cc2.txt",
-        "crlf.ply",
-        "d.ply",
-        "exp.xyz",
-        "fcol.ply",
-        "fortran.xyz",
-        "g.ptx",
-        "name.csv",
+        *("be.ply", "cc.txt", "cc2.txt", "crlf.ply", "d.ply", "exp.xyz", "fcol.ply", "fortran.xyz"),
+        *("g.ptx", "name.csv"),
     ),
     *(
-        "nan.ply",
-        "nan.xyz",
-        "nan_first.ply",
-        "nan_first.xyz",
-        "ptx_as.pts",
-        "semi.txt",
-        "trail.csv",
-        "two.pts",
+        *("nan.ply", "nan.xyz", "nan_first.ply", "nan_first.xyz", "ptx_as.pts", "semi.txt"),
+        *("trail.csv", "two.pts"),
     ),
     *("upper.ply", "utf16.txt", "zeros.ply"),
 ]

@@ -30,13 +30,7 @@ def place(tmp_path, monkeypatch):
 
 
 CLOUD = (
-    "--cloud",
-    "scan.laz",
-    "--outlines",
-    "stones.geojson",
-    "--wall",
-    "wall.toml",
-    "--header",
+    *("--cloud", "scan.laz", "--outlines", "stones.geojson", "--wall", "wall.toml", "--header"),
     "head.moma",
 )
 

@@ -213,12 +213,7 @@ def test_what_is_kept_again_is_the_same_record(measured, code):
     for name in ("vertices", "points", "normal", "outline", "solid_vertices", "vertex_sigma", "covariance"):
         np.testing.assert_array_equal(getattr(again, name), getattr(record, name), err_msg=name)
     for name in (
-        "depth",
-        "depth_origin",
-        "provenance",
-        "provenance_text",
-        "rejected",
-        "rejected_vertices",
+        *("depth", "depth_origin", "provenance", "provenance_text", "rejected", "rejected_vertices"),
         "shape",
     ):
         assert getattr(again, name) == getattr(record, name), name

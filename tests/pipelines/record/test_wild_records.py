@@ -18,19 +18,7 @@ from pipelines.record.record import record
 from tests.archmodel.stones import SHA, box_stone
 
 NAMES = (
-    "V1",
-    "V2",
-    "tuff",
-    "2",
-    "WALL",
-    "P1",
-    "header",
-    "voussoir",
-    "star",
-    "crack",
-    "mark",
-    "m",
-    "-",
+    *("V1", "V2", "tuff", "2", "WALL", "P1", "header", "voussoir", "star", "crack", "mark", "m", "-"),
     "density",
 )
 TEXTS = st.sampled_from(

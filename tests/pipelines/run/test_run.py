@@ -196,10 +196,7 @@ def test_a_run_keeps_its_peaks_its_series_and_its_inputs(own_url, tmp_path):
     assert {"series_stones.csv", "series_joints.csv"} <= set(summary["files"])
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     for words in (
-        "window bay (synthetic)",
-        "density 2350 kg/m³",
-        "DryJoint: friction",
-        "W01-03",
+        *("window bay (synthetic)", "density 2350 kg/m³", "DryJoint: friction", "W01-03"),
         "gravity (0, 0, -9.81)",
     ):
         assert words in page

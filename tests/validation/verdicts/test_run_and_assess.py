@@ -21,11 +21,8 @@ SETTINGS = [
     for step in STEPS
 ]
 FEW = (
-    "cube on a slope +2.5 %",
-    "bar 0.5×0.5, μ 0.9",
-    "shaft of 4, no floor",
-    "tower, stone at its side",
-    "hook, μ 0.6",
+    *("cube on a slope +2.5 %", "bar 0.5×0.5, μ 0.9", "shaft of 4, no floor"),
+    *("tower, stone at its side", "hook, μ 0.6"),
 )
 ALONG = Acceleration((1.0, 0.0, 0.0))
 

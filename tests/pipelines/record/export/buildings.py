@@ -9,16 +9,7 @@ from pipelines.reports.page.model import Column
 from pipelines.reports.page.surfaces import stones_of
 
 HOSTILE = (
-    "W 01",
-    "Straße-ä",
-    "it's",
-    'a "b"',
-    "back\\slash",
-    "שלום",
-    "مرحبا 7",
-    "石",
-    "𝔐",
-    "<&>;,|",
+    *("W 01", "Straße-ä", "it's", 'a "b"', "back\\slash", "שלום", "مرحبا 7", "石", "𝔐", "<&>;,|"),
     "α'\\X2\\",
 )
 
