@@ -15,7 +15,12 @@ COMMON = "US"
 """Kind of a unit of which nothing else is said."""
 
 _RED, _ORANGE, _BLUE, _GREEN, _GOLD, _BRONZE = (
-    *("#9B3333", "#D86400", "#248FE7", "#31792D", "#D8BD30", "#B19F61"),
+    "#9B3333",
+    "#D86400",
+    "#248FE7",
+    "#31792D",
+    "#D8BD30",
+    "#B19F61",
 )
 
 UNIT_KINDS: Mapping[str, tuple[str, str, str, str]] = {

@@ -110,10 +110,7 @@ def write_vtu(path: Path, grid: UnstructuredGrid) -> None:
         "</Points>",
         "<Cells>",
         *_cells(grid.cells),
-        "</Cells>",
-        "</Piece>",
-        "</UnstructuredGrid>",
-        "</VTKFile>",
+        *("</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>"),
     ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

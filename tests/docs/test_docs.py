@@ -134,12 +134,8 @@ TEXTS = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 OUTSIDE = {
-    "http://127.0.0.1:8000",
-    "https://github.com/nschloe/meshio",
-    "https://keepachangelog.com",
-    "https://semver.org",
-    "https://toml.io",
-    "https://…",
+    *("http://127.0.0.1:8000", "https://github.com/nschloe/meshio", "https://keepachangelog.com"),
+    *("https://semver.org", "https://toml.io", "https://…"),
 }
 """Addresses outside the project; whoever adds one opens it before."""
 

@@ -116,10 +116,7 @@ def print_pdf(page: Path, target: Path, language: str = "en") -> None:
         printed = Path(folder) / "page.pdf"
         command = [
             browser,
-            "--headless",
-            "--disable-gpu",
-            "--enable-unsafe-swiftshader",
-            "--no-first-run",
+            *("--headless", "--disable-gpu", "--enable-unsafe-swiftshader", "--no-first-run"),
             "--no-pdf-header-footer",
             f"--user-data-dir={folder}/profile",
             f"--print-to-pdf={printed}",

@@ -65,7 +65,11 @@ ALIASES: Mapping[str, Sequence[str]] = {
         *("fonte profondità", "fuente profundidad"),
     ),
     "depth_origin": (
-        *("depth origin", "origin depth", "Herkunft Tiefe", "Tiefe Herkunft", "origine profondeur"),
+        "depth origin",
+        "origin depth",
+        "Herkunft Tiefe",
+        "Tiefe Herkunft",
+        "origine profondeur",
     ),
     "zone": (
         *("zone", "part", "sector", "bay", "wall", "facade", "Bereich", "Zone", "Bauteil", "Wand"),

@@ -350,10 +350,7 @@ def write_metashape(network: Network, path: Path) -> None:
     out += ["</markers>", "</frame>", "</frames>", "<settings>"]
     out += [
         f'<property name="accuracy_projections" value="{sigma!r}"/>',
-        "</settings>",
-        "</chunk>",
-        "</document>",
-        "",
+        *("</settings>", "</chunk>", "</document>", ""),
     ]
     path.write_text("\n".join(out), encoding="utf-8", newline="\n")
 

@@ -25,15 +25,7 @@ from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone
 
 _PARTICULAR = {
-    "jamb",
-    "sill",
-    "lintel",
-    "mullion",
-    "springer",
-    "voussoir",
-    "keystone",
-    "quoin",
-    "infill",
+    *("jamb", "sill", "lintel", "mullion", "springer", "voussoir", "keystone", "quoin", "infill"),
     "support",
 }
 _ENOUGH = GROUP  # least number of stones of a kind for its usual length

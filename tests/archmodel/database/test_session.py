@@ -32,16 +32,9 @@ def test_a_database_of_another_schema_version_is_refused(empty: Database) -> Non
 @pytest.mark.parametrize(
     "url",
     [
-        "moma.db",
-        "",
-        "sqlite://moma.db",
-        "sqlite://user@host/moma.db",
-        "sqlite:///a.db?mode=ro",
-        "sqlite:///a\0b.db",
-        "mysql://localhost/moma",
-        "postgresql+psycopg2://localhost/moma",
-        "nosuch:///moma.db",
-        "http://[::1/moma",
+        *("moma.db", "", "sqlite://moma.db", "sqlite://user@host/moma.db", "sqlite:///a.db?mode=ro"),
+        *("sqlite:///a\0b.db", "mysql://localhost/moma", "postgresql+psycopg2://localhost/moma"),
+        *("nosuch:///moma.db", "http://[::1/moma"),
     ],
 )
 def test_a_wrong_url_says_how_to_write_one(url: str) -> None:

@@ -59,7 +59,14 @@ def test_a_wall_with_an_opening(slab):
     courses = [[1, 1, 1], [1, -1, 1], [0.5, 2, 0.5]]
     stones = shapes.wall(courses, 0.5, 0.2, 0.3, slab=slab, mesh_size=0.1)
     assert [stone.code for stone in stones if stone.code != "base"] == [
-        *("1-1", "1-2", "1-3", "2-1", "2-3", "3-1", "3-2", "3-3"),
+        "1-1",
+        "1-2",
+        "1-3",
+        "2-1",
+        "2-3",
+        "3-1",
+        "3-2",
+        "3-3",
     ]
     fixed = {stone.code for stone in stones if stone.fidelity is Fidelity.FIXED}
     assert fixed == ({"base"} if slab else {"1-1", "1-2", "1-3"})

@@ -117,15 +117,7 @@ def test_a_query_loads_no_package_that_it_does_not_ask(tmp_path):
     )
     loaded = done.stdout.split()
     heavy = {
-        "scipy",
-        "numba",
-        "pyvista",
-        "matplotlib",
-        "gmsh",
-        "jinja2",
-        "trimesh",
-        "alembic",
-        "h5py",
+        *("scipy", "numba", "pyvista", "matplotlib", "gmsh", "jinja2", "trimesh", "alembic", "h5py"),
         "skfem",
     }
     assert "sqlalchemy" in loaded

@@ -154,18 +154,8 @@ def same(before, after):
 
 
 CODES = [
-    "PLAIN",
-    "BARE",
-    "SIGMAS",
-    "BROKEN",
-    "TWICE",
-    "REVERSED",
-    "MIXED",
-    "DIRECTED",
-    "TAPERED",
-    "BLUNDER",
-    "SEEN",
-    "UP",
+    *("PLAIN", "BARE", "SIGMAS", "BROKEN", "TWICE", "REVERSED", "MIXED", "DIRECTED", "TAPERED"),
+    *("BLUNDER", "SEEN", "UP"),
 ]
 
 

@@ -87,13 +87,7 @@ def test_what_programs_may_rely_on(tmp_path):
         tmp_path / "a",
     )
     assert {
-        "sigma0",
-        "redundancy",
-        "observations",
-        "unknowns",
-        "iterations",
-        "camera",
-        "photos",
+        *("sigma0", "redundancy", "observations", "unknowns", "iterations", "camera", "photos"),
         "points",
     } <= told.keys()
     assert set(told["camera"]) == set(calibrate.split(","))

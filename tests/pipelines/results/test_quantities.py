@@ -104,12 +104,8 @@ def test_stresses_that_differ_by_a_factor_differ_by_that_on_every_mesh(factor):
 def test_a_rigid_run_has_no_stress_but_all_the_rest():
     apart = differences(quantities(stack(rigid=True, sunk=0.001)), quantities(stack()))
     assert [name for name, value in apart.items() if value is None] == [
-        "von_mises_max",
-        "von_mises_p99",
-        "von_mises_mean",
-        "stone_von_mises_p99",
-        "stone_von_mises_mean",
-        "energy",
+        *("von_mises_max", "von_mises_p99", "von_mises_mean", "stone_von_mises_p99"),
+        *("stone_von_mises_mean", "energy"),
     ]
     assert apart["displacement"] == pytest.approx(0.5)
     assert apart["stone_displacement"] == pytest.approx(0.5)

@@ -46,12 +46,8 @@ def shifted(places, code):
 
 HEADS = {
     "moma": [
-        "moma-survey 1",
-        "name wall",
-        "observer 12 -20 1",
-        "sigma 0.003",
-        "depth header 0.4 source guess",
-        "",
+        *("moma-survey 1", "name wall", "observer 12 -20 1", "sigma 0.003"),
+        *("depth header 0.4 source guess", ""),
     ],
     "csv": ["block,kind,course,role,x,y,z,sigma,depth"],
     "pnezd": ["Point,Northing,Easting,Elevation,Code"],

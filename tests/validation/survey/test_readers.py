@@ -455,20 +455,7 @@ def spoiled(rng, line):
     """Damage one line as accidents do."""
     cut = int(rng.integers(len(line) + 1))
     odd = [
-        "\t",
-        ";",
-        ",",
-        '"',
-        "#",
-        "nan",
-        "1e400",
-        "-",
-        "ü",
-        "١",
-        "\u2028",
-        "{}",
-        "stone",
-        "end",
+        *("\t", ";", ",", '"', "#", "nan", "1e400", "-", "ü", "١", "\u2028", "{}", "stone", "end"),
         "0" * 400,
         " ",
         "--1",

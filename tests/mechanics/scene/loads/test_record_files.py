@@ -30,13 +30,9 @@ def message_of(function, *arguments):
 @pytest.mark.parametrize(
     "steps",
     [
-        "NPTS=     12, DT=   .0050 SEC",
-        "NPTS=  12, DT= .00500 SEC,",
-        "NPTS=12,DT=0.005SEC",
-        "NPTS =   12 , DT =  5.0E-03 SEC",
-        "npts= 12, dt= 0.005 sec",
-        "     12    0.0050    NPTS, DT",
-        "12 .005 NPTS, DT",
+        *("NPTS=     12, DT=   .0050 SEC", "NPTS=  12, DT= .00500 SEC,", "NPTS=12,DT=0.005SEC"),
+        *("NPTS =   12 , DT =  5.0E-03 SEC", "npts= 12, dt= 0.005 sec"),
+        *("     12    0.0050    NPTS, DT", "12 .005 NPTS, DT"),
     ],
 )
 def test_every_variant_of_the_header_is_understood(tmp_path, steps):

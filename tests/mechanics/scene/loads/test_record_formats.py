@@ -16,13 +16,8 @@ EAST, NORTH, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 def esm(stream="HNE", unit="cm/s^2", values=VALUES, count=None, kind="ACCELERATION"):
     """The header of ESM and ITACA (DYNA 1.2), shortened."""
     keys = [
-        "EVENT_NAME: NOWHERE",
-        "EVENT_ID: XX-2000-0001",
-        "EVENT_DATE_YYYYMMDD: 20000101",
-        "MAGNITUDE_W: 5.2",
-        "NETWORK: XX",
-        "STATION_CODE: ABC",
-        "VS30_M/S:",
+        *("EVENT_NAME: NOWHERE", "EVENT_ID: XX-2000-0001", "EVENT_DATE_YYYYMMDD: 20000101"),
+        *("MAGNITUDE_W: 5.2", "NETWORK: XX", "STATION_CODE: ABC", "VS30_M/S:"),
         "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS: 20000101_010000.000",
         "SAMPLING_INTERVAL_S: 0.005000",
         f"NDATA: {len(values) if count is None else count}",

@@ -432,19 +432,7 @@ def test_the_short_way_of_reading_coordinates_reads_what_the_long_one_does(tmp_p
     """Lines of vertices and points are matched as a whole; a comment at their end asks for the long way."""
     words = ["0", "-0", "+1", ".5", "5.", "1e3", "1E-3", "1e-400", "100000000", "1e8", "1.0000001e8", "1e999"]
     words += [
-        "e5",
-        "--1",
-        "1e",
-        "1_0",
-        "nan",
-        "1,5",
-        "0x1",
-        "1e5.0",
-        ".",
-        "-",
-        "١",
-        "1e+",
-        "1e05",
+        *("e5", "--1", "1e", "1_0", "nan", "1,5", "0x1", "1e5.0", ".", "-", "١", "1e+", "1e05"),
         "00012.50",
     ]
     for word in words:

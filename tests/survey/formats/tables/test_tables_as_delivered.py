@@ -350,7 +350,12 @@ def test_an_outline_that_is_not_one_is_refused(tmp_path, outline, words):
 
 def test_kinds_have_words_in_five_languages():
     assert [kind_of(one, {}) for one in ("Läufer", "LAEUFER", "clé", "dovela", "Header", "rib segment")] == [
-        *("stretcher", "stretcher", "keystone", "voussoir", "header", "rib_segment"),
+        "stretcher",
+        "stretcher",
+        "keystone",
+        "voussoir",
+        "header",
+        "rib_segment",
     ]
     assert kind_of("SPR", {"spr": "springer"}) == "springer"
 
