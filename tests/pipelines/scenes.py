@@ -29,6 +29,8 @@ fixed = ["course = 1"]
 """
 # the same with one deformable stone
 TWO_COURSES_MIXED = TWO_COURSES.replace("fixed =", 'deformable = ["W02-02"]\nfixed =')
+# all of three stones of a survey made by `survey_text`
+THREE_STONES = TWO_COURSES.replace("Two courses", "Three stones").replace("course <= 2", "depth > 0")
 
 
 def assembled(url: str, text: str) -> Assembly:

@@ -11,24 +11,17 @@ import pytest
 from pipelines.record.export.export import ENDINGS
 from tests.moma.commands import answer, fails, invoke, prints
 from tests.paths import SAMPLE
+from tests.pipelines.scenes import TWO_COURSES
 
-SCENE = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
+SCENE = (
+    TWO_COURSES
+    + """\
 [contact]
 friction = 0.55
 [time]
 duration = 0.002
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from pipelines.draw.pictures import draw_apart
 from pipelines.run import record
 from tests.moma.commands import answer, invoke, prints
 from tests.paths import SAMPLE
-from tests.pipelines.scenes import small_geology
+from tests.pipelines.scenes import TWO_COURSES, small_geology
 
 
 @pytest.mark.parametrize("state", ["absent", "unloadable"])
@@ -118,18 +118,9 @@ def test_a_run_without_matplotlib_and_gmsh_keeps_its_results_and_says_what_is_mi
     assert answer("runs", "1", "--db", url)["versions"]["gmsh"] == "not installed"
 
 
-SCENE = """
-[scene]
-name = "Two courses"
-[select]
-where = ["course <= 2"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
+SCENE = (
+    TWO_COURSES
+    + """\
 [contact]
 friction = 0.55
 [time]
@@ -137,6 +128,7 @@ duration = 0.002
 [output]
 pictures = []
 """
+)
 
 
 @pytest.mark.parametrize(

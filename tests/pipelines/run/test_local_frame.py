@@ -16,26 +16,18 @@ from archmodel.store.stones import load_stones
 from pipelines.ingest.ingest import ingest
 from pipelines.run.assemble import local_origin, stone_about
 from pipelines.run.run import run_scene
-from tests.pipelines.scenes import assembled, survey_text
+from tests.pipelines.scenes import THREE_STONES, assembled, survey_text
 
 GRID = np.array([652_345.0, 6_862_789.0, 1_040.0])
 ORIGIN = np.array([652_000.0, 6_863_000.0, 1_000.0])  # the nearest multiple of 1 km
 
-SCENE = """
-[scene]
-name = "Three stones"
-[select]
-where = ["depth > 0"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
+SCENE = (
+    THREE_STONES
+    + """\
 [output]
 pictures = []
 """
+)
 LOADS = """
 [[loads]]
 type = "force"

@@ -20,22 +20,13 @@ from survey.joints.report import ClosingReport
 from survey.joints.report import StoneJoint as SurveyedJoint
 from survey.joints.settings import JointMode
 from tests.pipelines.results_by_hand import joints_of
-from tests.pipelines.scenes import survey_text
+from tests.pipelines.scenes import THREE_STONES, survey_text
 
 FAR = np.array([652_345.0, 6_862_789.0, 1_040.0])
 
-SCENE = """
-[scene]
-name = "Three stones"
-[select]
-where = ["depth > 0"]
-[materials.limestone]
-density = 2350.0
-young = 12e9
-poisson = 0.2
-[bodies]
-default = "rigid"
-fixed = ["course = 1"]
+SCENE = (
+    THREE_STONES
+    + """\
 [time]
 step = 0.004
 [solver]
@@ -43,6 +34,7 @@ tolerance = 1e-9
 [output]
 pictures = []
 """
+)
 
 # lowest left corner and length of the faces [m]; the joints between them are open by 10 mm
 FACES = {"LEFT": (1, 0.0, 0.0, 0.5), "RIGHT": (1, 0.51, 0.0, 0.5), "TOP": (2, 0.2, 0.3, 0.6)}
