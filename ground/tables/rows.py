@@ -201,9 +201,9 @@ class ListRows:
         """Return the separator of the rows as text."""
         return (self.delimiter or "",)
 
-    def fail(self, line: int, what: str, remedy: str) -> SurveyError:
+    def fail(self, line: int, what: str, remedy: str, kind: type[SurveyError] = SurveyError) -> SurveyError:
         """Make an error that names a row."""
-        return SurveyError(what, where=f"{self.path}:{line}" if line else self.path, remedy=remedy)
+        return kind(what, where=f"{self.path}:{line}" if line else self.path, remedy=remedy)
 
 
 def _sheet_rows(path: Path, sheet: str | None) -> ListRows:

@@ -472,9 +472,9 @@ class PointCollector:
                 f'say what they stand for, e.g. --kinds "{table}"; ashlar is a stone of no special kind',
             )
 
-    def fail(self, line: int, what: str, remedy: str) -> SurveyError:
+    def fail(self, line: int, what: str, remedy: str, kind: type[SurveyError] = SurveyError) -> SurveyError:
         """Make an error that names a line of the file."""
-        return SurveyError(what, where=f"{self._path}:{line}", remedy=remedy)
+        return kind(what, where=f"{self._path}:{line}", remedy=remedy)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -576,14 +576,12 @@ class PointCollector:
             if new is not None and old is None:
                 setattr(stone, name, new)
             elif new is not None and new != old:
-                error = self.fail(
+                raise self.fail(
                     line,
                     f"kind, course or zone of block {identity.code} differs from line {stone.line}",
                     "give every line of a block the same kind and course",
+                    SurveyError if identity.course in (None, stone.course) else _AnotherCourseError,
                 )
-                if identity.course not in (None, stone.course):
-                    raise _AnotherCourseError(error.what, where=error.where, remedy=error.remedy)
-                raise error
         stone.agreed = identity
         return stone
 
@@ -826,14 +824,13 @@ class _RowReader:
             sigma = self._decimals.length(text, "sigma", number, self._scale["sigma"])
         if identity.code in self._table.stones:
             before = self._table.stones[identity.code]
-            error = self._fail(
+            same_course = None in (identity.course, before.course) or identity.course == before.course
+            raise self._fail(
                 number,
                 f"block {identity.code} a second time",
                 f"the first is on line {before.line}; draw one outline for each",
+                SurveyError if same_course else _AnotherCourseError,
             )
-            if None not in (identity.course, before.course) and identity.course != before.course:
-                raise _AnotherCourseError(error.what, where=error.where, remedy=error.remedy)
-            raise error
         stone = self._stone_of(identity, values, number)
         for corner in corners.tolist():
             stone.add_place(True, (corner[0], corner[1], corner[2]), sigma, None)
