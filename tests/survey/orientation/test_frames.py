@@ -155,6 +155,20 @@ def test_what_bars_and_lines_determine_is_free_of_marks():
     assert lengths._free_columns(network([((0, 1), 1.0, 0.1)]), SimpleNamespace(datum=False)) == []
 
 
+def test_of_two_bars_that_contradict_each_other_each_misses_by_half_and_is_as_sure_as_their_mean(monkeypatch):
+    """Points are exact but for their scale: of two equal bars, residuals have the variance σ²/2."""
+    points = np.array([[0.0, 0, 0], [5, 0, 0], [0, 2, 0], [5, 2, 0]])
+    about = network([((0, 1), 5.04, 0.01), ((2, 3), 4.96, 0.01)])
+    monkeypatch.setattr(lengths, "_covariances", lambda *_: (np.zeros((2, 6)), np.zeros((4, 2, 3))))
+    monkeypatch.setattr(lengths, "inner_constraints", lambda *_: np.zeros((6, len(lengths.SIMILARITY))))
+    found = lengths.fit_lengths(about, SimpleNamespace(datum=True), unknowns(points), np.zeros((6, 6)))
+    assert found is not None
+    off, test, redundancy, square = list(vars(found).values())[:4]
+    assert off == pytest.approx([0.04, -0.04])
+    assert test == pytest.approx([4.0 * np.sqrt(2.0)] * 2)
+    assert (redundancy, square) == (1, pytest.approx(32.0))
+
+
 def test_what_marks_can_find_follows_from_their_redundancy():
     """A blunder of 4.13 σ over the root of the redundancy is found with 80 % (Baarda)."""
     parts = np.array([[0.25, 1.0], [0.0, 0.04]])

@@ -352,9 +352,10 @@ def samples_of(kind, count=400):
     return {"normal": norm.ppf(shares), "uniform": shares, "skew": np.exp(norm.ppf(shares))}[kind]
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-4, 1e4])
 @pytest.mark.parametrize(("kind", "told"), [("normal", 0), ("uniform", 1), ("skew", 1)])
-def test_samples_that_are_not_normal_are_told_with_both_intervals(kind, told):
-    values = samples_of(kind)
+def test_samples_that_are_not_normal_are_told_with_both_intervals(kind, told, unit):
+    values = unit * samples_of(kind)
     estimates = SimpleNamespace(
         linear=object(), gradient=None, weights=None, indices=None, values={"q": values}
     )
