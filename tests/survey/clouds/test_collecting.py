@@ -68,7 +68,7 @@ def test_every_cube_of_space_lists_the_outlines_whose_slab_reaches_into_it():
     rng = np.random.default_rng(3)
     boxes = [collecting._box(one, 0.2) - origin for one in placed]
     seen = 0
-    for place in rng.uniform([-1.0, -1.0, -0.25], [4.0, 1.0, 3.2], (400, 3)):
+    for place in rng.uniform([-1.0, -1.0, -0.25], [4.0, 1.0, 3.2], (4000, 3)):
         within = {k for k, (low, high) in enumerate(boxes) if ((place > low) & (place < high)).all()}
         cell = np.floor((place - grid.low) / grid.side).astype(int)
         if (cell < 0).any() or (cell >= grid.shape).any():
@@ -78,4 +78,4 @@ def test_every_cube_of_space_lists_the_outlines_whose_slab_reaches_into_it():
         listed = set(grid.members[grid.start[number] : grid.start[number + 1]].tolist())
         assert within <= listed
         seen += len(within)
-    assert seen > 20
+    assert seen > 50
