@@ -84,9 +84,9 @@ class TextLines:
             if text and not text.startswith("#"):
                 yield number, line
 
-    def fail(self, line: int, what: str, remedy: str) -> SurveyError:
+    def fail(self, line: int, what: str, remedy: str, kind: type[SurveyError] = SurveyError) -> SurveyError:
         """Make an error that names a line of this file."""
-        return SurveyError(what, where=f"{self.path}:{line}", remedy=remedy)
+        return kind(what, where=f"{self.path}:{line}", remedy=remedy)
 
     def _convert(self) -> None:
         """Convert UTF-16, or lines that end in carriage returns alone, to UTF-8 with line feeds."""
