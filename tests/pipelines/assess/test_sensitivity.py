@@ -1,11 +1,15 @@
 """First-order change of limit loads with friction and depth, against closed forms and differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mechanics.limit.assembly import assembly
 from mechanics.limit.limit_load import limit_load
 from mechanics.limit.live_loads import Acceleration
+from mechanics.scene.laws.mortar import MortarJoint
+from mechanics.scene.scene import ContactSettings
 from pipelines.assess.sensitivity import sensitivity
 from tests.mechanics.shapes import brick, ground, scene
 
@@ -28,6 +32,20 @@ def test_a_stone_that_slides_bears_in_proportion_to_its_friction():
     found = changes([ground(), brick("a", (0, 0, 0), (2.0, 1.0, 0.5))], 0.3)
     assert found.friction == pytest.approx(1.0, rel=1e-5)
     assert found.depth == pytest.approx(0.0, abs=1e-4)
+
+
+def test_of_a_block_in_mortar_friction_has_the_share_of_what_it_carries():
+    """λ W = μ (W + f A) + c A: what friction carries of it is its change."""
+    stones = scene(ground(), brick("a", (0, 0, 0), (2.0, 1.0, 0.5)))
+    law = MortarJoint(0.3, tension=2e3, shear=5e3)
+    on = assembly(replace(stones, contact=ContactSettings(law)))
+    limit = limit_load(on, PUSH)
+    carried = 0.3 * (on.weight + float(on.strength.tension.sum()))
+    assert limit.multiplier * on.weight == pytest.approx(
+        carried + float(on.strength.cohesion.sum()), rel=1e-5
+    )
+    found = sensitivity(on, PUSH, limit, X)
+    assert found.friction == pytest.approx(carried / (limit.multiplier * on.weight), rel=1e-4)
 
 
 def test_a_wall_that_tips_and_slides_at_once_changes_as_differences_say():

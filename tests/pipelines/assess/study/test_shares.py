@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from ground.errors import SceneError
-from pipelines.assess.study import actions, gradient, prepare, summary
+from pipelines.assess.study import actions, estimates, gradient, prepare, summary
 from pipelines.assess.study.inputs.distributions import Distribution
 from pipelines.assess.study.inputs.moved import MovedStones
 from pipelines.assess.study.inputs.unknowns import Unknown, Unknowns
+from pipelines.assess.study.methods.failure import Failure
+from pipelines.assess.study.methods.first_order import FirstOrder
 from pipelines.assess.study.settings import Acts, InputTable, InputType, Shape
 
 SPREAD = Distribution(Shape.NORMAL, 0.0, 2.0)
@@ -199,3 +201,29 @@ def test_a_first_order_that_is_not_good_enough_is_told_by_how_much():
     )
     assert "the derivative by depth is 0.5 below its mean and 0.25 above" in found[0]
     assert found[1].startswith("4 samples have no answer, as the first: it fell")
+
+
+@pytest.mark.parametrize(
+    ("level", "above", "share"), [(0.3, False, 0.00135), (0.38, True, 0.1587), (0.36, False, 0.5)]
+)
+def test_a_first_order_prediction_fails_as_a_normal_one_does(level, above, share):
+    """Of the mean 0.36 and the standard deviation 0.02: three, one and no standard deviations off."""
+    linear = FirstOrder(0.36, 0.02, np.array([0.012, 0.016]), 0.0, -1, 1)
+    found = estimates._first_order(
+        SimpleNamespace(dimension=2), "bound", linear, Failure("bound", level, above)
+    )
+    assert found.probability.low_value == pytest.approx(share, rel=1e-3)
+    assert (found.probability.low, found.probability.high) == (0.0, 1.0)
+    assert found.means["bound"].value == 0.36
+    assert estimates._first_order(SimpleNamespace(dimension=2), "bound", linear, None).probability is None
+
+
+def test_levels_of_a_curve_go_from_the_least_to_the_largest_value():
+    found = estimates._levels(np.array([0.2, np.nan, 0.6, 0.3]))
+    assert (found[0], found[-1]) == (0.2, 0.6)
+    assert np.diff(found) == pytest.approx(np.full(len(found) - 1, 0.4 / (len(found) - 1)))
+    assert estimates._levels(np.array([np.nan])) == ()
+
+
+def test_further_design_points_are_sought_along_what_stones_have_in_common():
+    assert estimates._starts(problem()) == [0, 1, 4]
