@@ -1,7 +1,7 @@
 """An outline of a stone, and what its attributes say of the stone."""
 
 import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -350,11 +350,3 @@ def _course(text: str | None, where: str) -> int | None:
         remedy = "count courses from the ground: 1, 2, …; or name another attribute with --fields"
         raise SurveyError(f"course {text!r} is not a whole number", where=where, remedy=remedy)
     return int(value)
-
-
-def distinct(outlines: Sequence[Outline]) -> Iterator[tuple[Outline, Outline | None]]:
-    """Yield each outline with the earlier one of the same code, if there is one."""
-    seen: dict[str, Outline] = {}
-    for outline in outlines:
-        yield outline, seen.get(outline.code)
-        seen.setdefault(outline.code, outline)

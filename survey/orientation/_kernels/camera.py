@@ -18,9 +18,6 @@ Interior orientation is the row c, x_p, y_p, a, s, K₁, K₂, K₃, P₁, P₂.
 
 from numba import njit
 
-INTERIOR = 10
-"""Number of parameters of the interior orientation."""
-
 PARAMETERS = 16
 """Parameters that a ray has on the camera's side: rotation, station, interior orientation."""
 

@@ -18,7 +18,6 @@ from mechanics.scene.threads import at_once
 from tests.mechanics.shapes import TURN, brick, detected, ground, moved, scene
 
 SOFT = Fidelity.DEFORMABLE
-DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 def wedge(axis, degrees):

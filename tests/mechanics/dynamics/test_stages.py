@@ -53,10 +53,6 @@ def body(result, code):
     return found
 
 
-def force_of(stage, code):
-    return stage.forces[stage.supports.index(code)]
-
-
 def test_the_reaction_is_the_weight_after_every_stage():
     result = simulate_stages(portal())
     assert [one.outcome for one in result.stages] == ["equilibrium", "settled", "equilibrium"]

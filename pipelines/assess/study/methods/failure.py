@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mechanics.arrays import Array, Bools
+from mechanics.arrays import Array
 from pipelines.assess.workers.store import Sample
 
 
@@ -52,9 +52,3 @@ class Failure:
             return None
         gradient: Array = self.sign * sample.gradient
         return gradient
-
-
-def unknown(states: Array) -> Bools:
-    """Return which states (m,) are not known."""
-    missing: Bools = np.isnan(states)
-    return missing

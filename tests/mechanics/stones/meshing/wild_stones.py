@@ -8,10 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.pipelines.results_by_hand import box
 
+
 # the planes of a cube's corners: which of the low and high sides of x, y, z meet there
-_SIDES = ((0, 1), (2, 3), (4, 5))
-
-
 def wild_hexahedron(rng, slender=None):
     """Corners (8, 3) of a hexahedron with planar faces that lean, each by itself, as long as it stays one.
 
