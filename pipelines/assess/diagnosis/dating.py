@@ -66,7 +66,7 @@ def date_movement(
     """
     best = ranking.hypotheses[0]
     shares = tuple(_share(measurements, phase, whole) for phase in file.phases)
-    evidence = tuple(_evidence(file, measurements, whole, shares))
+    evidence = tuple(_evidence(measurements, whole, shares))
     return Dating(_verdict(file, ranking, best), shares, evidence)
 
 
@@ -101,9 +101,7 @@ def _share(measurements: Measurements, phase: str, whole: Motions) -> Share:
     return Share(phase, product / square, 1.0 / math.sqrt(square))
 
 
-def _evidence(
-    file: DiagnosisFile, measurements: Measurements, whole: Motions, shares: tuple[Share, ...]
-) -> Iterator[str]:
+def _evidence(measurements: Measurements, whole: Motions, shares: tuple[Share, ...]) -> Iterator[str]:
     lines = compare_courses(measure_beds(measurements.stones, measurements.facades)[0], whole.displacement)
     for index, share in enumerate(shares):
         dated = [line for line in lines if measurements.phases[line.line.codes[0]] == share.phase]

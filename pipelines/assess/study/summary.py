@@ -83,7 +83,7 @@ def summary_of(
         "versions": dict(versions()),
         "files": [INDEX, "samples.csv", "actions.csv", "report.html"],
     }
-    summary["cautions"] = _cautions(problem, estimates, summary)
+    summary["cautions"] = _cautions(estimates, summary)
     summary["headline"] = _headline(summary)
     return summary
 
@@ -198,7 +198,7 @@ def certain(problem: Problem) -> list[str]:
     return [*found, "the model itself: rigid stones, their bond, and how joints are closed"]
 
 
-def _cautions(problem: Problem, estimates: Estimates, summary: Mapping[str, Any]) -> list[str]:
+def _cautions(estimates: Estimates, summary: Mapping[str, Any]) -> list[str]:
     told = []
     linear = summary["linear"]
     if linear is not None and not linear["linear"]:

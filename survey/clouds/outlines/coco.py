@@ -75,7 +75,7 @@ def read_coco(
     classes = [_category(annotation, kinds) for annotation in annotations]
     stones = class_of_stones(path, Counter(name for name in classes if name), category, "categories")
     annotations = [one for one, name in zip(annotations, classes, strict=True) if stones in (None, name)]
-    outlines = tuple(_outlines(path, annotations, kinds, size, tolerance, chosen))
+    outlines = tuple(_outlines(path, annotations, kinds, tolerance, chosen))
     name = Path(str(image.get("file_name", path.name))).name
     places = world_of(path.with_name(name)) or world_of(path)
     return outlines, places, size
@@ -103,7 +103,6 @@ def _outlines(
     path: Path,
     annotations: list[Any],
     kinds: Mapping[Any, str],
-    size: tuple[int, int] | None,
     tolerance: float,
     chosen: Mapping[str, str],
 ) -> Iterator[Outline]:

@@ -159,7 +159,7 @@ def _fitted(network: Network, prepared: Prepared, unknowns: Unknowns, cameras: A
     """Fit the observations after a step (np, 3) of the points; `misfit` is what the free movements leave."""
     off, moves, sigma = _observed(network, unknowns)
     off = off - np.einsum("ixm,ix->m", moves, moved)
-    by_cameras, by_points = _covariances(prepared, unknowns, cameras, network, moves)
+    by_cameras, by_points = _covariances(prepared, unknowns, cameras, moves)
     spread = np.einsum("imx,ixn->mn", by_points, moves) + np.diag(sigma**2)
     weight = np.linalg.inv(0.5 * (spread + spread.T))
     chosen = _free_columns(network, prepared)
@@ -203,9 +203,7 @@ def _observed(network: Network, unknowns: Unknowns) -> tuple[Array, Array, Array
     return np.array([row[0] for row in rows]), moves, np.array([row[4] for row in rows])
 
 
-def _covariances(
-    prepared: Prepared, unknowns: Unknowns, cameras: Array, network: Network, moves: Array
-) -> tuple[Array, Array]:
+def _covariances(prepared: Prepared, unknowns: Unknowns, cameras: Array, moves: Array) -> tuple[Array, Array]:
     """Return the covariances of functions Σ Gᵀ p of the points with cameras (m, nr) and points (np, m, 3)."""
     count = moves.shape[2]
     weights = prior(prepared, unknowns)

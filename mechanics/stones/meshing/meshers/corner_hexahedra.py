@@ -24,7 +24,7 @@ def mesh_at_corners(vertices: Array, faces: Faces, size: SizeField | float, code
     ------
     MeshError : if a corner joins more than three faces, or cells would be inside out
     """
-    blocks, members = _blocks(vertices, faces, code)
+    blocks, members = _blocks(faces, code)
     # every point is a mean of corners: of one, of an edge, of a face, or of all
     base = np.array([vertices[list(member)].mean(axis=0) for member in members])
     lengths = np.linalg.norm(base[blocks[:, [1, 3, 4]]] - base[blocks[:, :1]], axis=-1)
@@ -33,7 +33,7 @@ def mesh_at_corners(vertices: Array, faces: Faces, size: SizeField | float, code
     return solid_mesh(Element.HEX8, weights @ base / n**3, cells, vertices, faces, code)
 
 
-def _blocks(vertices: Array, faces: Faces, code: str) -> tuple[Ints, list[tuple[int, ...]]]:
+def _blocks(faces: Faces, code: str) -> tuple[Ints, list[tuple[int, ...]]]:
     """Return one hexahedron for each corner (nv, 8), between points that are means of the stone's corners."""
     used = sorted({corner for face in faces for corner in face})
     members: list[tuple[int, ...]] = [(corner,) for corner in used]
