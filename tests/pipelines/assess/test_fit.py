@@ -87,6 +87,13 @@ def test_a_start_whose_run_fails_is_left_by_a_scan():
     assert (never.trouble, never.residuals.size, never.turns) == ("fell", 0, 1)
 
 
+def test_a_run_beside_that_fails_ends_the_search_without_a_covariance():
+    found, asked = searched(lambda x: "fell" if x[0] > 0.05 else np.array([10.0 * x[0] - 3.0]), SETTLEMENT)
+    assert (found.amplitudes, found.trouble, len(asked)) == ((0.0,), "fell", 1)
+    assert np.isnan(found.covariance).all()
+    assert found.covariance.shape == (1, 1)
+
+
 def test_a_place_of_a_scan_must_be_better_than_the_start():
     assert fitting._least([(1.0,), (2.0,)], [np.array([2.0]), np.array([3.0])], np.array([2.1])) == (1.0,)
     assert fitting._least([(1.0,)], [np.array([2.0])], np.array([2.001])) is None

@@ -99,7 +99,7 @@ def design_point(evaluate: Evaluate, failure: Failure, start: Array) -> Design |
     """Return the design point that a search from a start (n,) comes to; None where there is no gradient."""
     point, previous = start.copy(), None
     tangents: list[_Tangent] = []
-    used, scale = 0, 1.0
+    used = 0
     while used < _MAX_SAMPLES:
         (sample,) = evaluate(point[None], gradient=True)
         used += 1
@@ -111,19 +111,11 @@ def design_point(evaluate: Evaluate, failure: Failure, start: Array) -> Design |
             point = 0.5 * (point + previous)
             continue
         tangent = _Tangent(point, gradient, state)
-        if tangents:
-            # the iteration swings where the limit state is curved: shorter steps where g has not come down
-            last = tangents[-1]
-            worse = abs(tangent.distance) > 0.9 * abs(last.distance)
-            swings = float((point - last.point) @ (last.goal - last.point)) > 0.0 and worse
-            scale = max(0.5 * scale, 0.05) if swings else min(1.5 * scale, 1.0)
         tangents = [*(tangents if tangent.distance > -_STILL else []), tangent]
         goal, gradient = _nearest(tangents)
         if float(np.linalg.norm(goal - point)) < _STILL * max(1.0, float(np.linalg.norm(goal))):
             return _designed(goal, gradient, True, used)
-        if len(tangents) > 1:
-            scale = 1.0
-        previous, point = point, point + scale * (goal - point)
+        previous, point = point, goal
     return _designed(tangents[-1].point, tangents[-1].gradient, False, used)
 
 

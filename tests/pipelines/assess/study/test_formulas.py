@@ -79,8 +79,9 @@ def test_a_search_that_meets_no_answer_goes_half_of_the_way_back():
             Sample(point, {"q": 3.0 - point[0] - point[0] ** 2}, gradient=np.array([-1.0 - 2.0 * point[0]]))
         ]
 
-    found = design_point(answer, FAILS, np.zeros(1))
-    assert asked[:3] == [0.0, 3.0, 1.5]
+    found = design_point(answer, FAILS, np.array([-0.25]))
+    # g is 3.1875 there and falls by 0.5
+    assert asked[:3] == pytest.approx([-0.25, 6.125, 0.5 * (6.125 - 0.25)])
     assert found.point == pytest.approx([0.5 * (np.sqrt(13.0) - 1.0)], abs=2e-3)
 
 
