@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ground.errors import SceneError
 from mechanics.dynamics.outcome import Outcome
@@ -15,10 +16,11 @@ from mechanics.limit.joints import resultants, stress_blocks
 from mechanics.limit.kinematic import kinematics
 from mechanics.limit.limit_load import Flow, Mechanism, limit_load, mechanism
 from mechanics.limit.live_loads import Acceleration, PointForce, SpreadForce, levers
-from mechanics.limit.loading_test import JawPath
+from mechanics.limit.loading_test import JawPath, LoadingTest, _Pushed
 from mechanics.limit.pushover import _Run
 from mechanics.limit.thickness import geometric_safety
 from mechanics.limit.thrust import thrust
+from mechanics.scene.rig import BEAM, Rig
 from mechanics.scene.scene import Block, Fidelity
 from tests.mechanics.shapes import BOX_FACES, LIMESTONE, brick, ground, scene
 
@@ -413,3 +415,50 @@ def test_jaws_go_to_their_places_in_turn_at_one_speed():
     assert [path.at(time) for time in (0.1, 0.2, 0.4, 0.5)] == pytest.approx([0.01, 0.02, 0.0, -0.01])
     path.rise = 0.003
     assert path.pose(0.1).displacement == pytest.approx([0.0, 0.01, 0.003])
+
+
+@pytest.mark.parametrize(
+    ("masses", "share"), [((1.0, 1.0, 1.0), 0.5), ((1.0, 1.0, 5.0), 1.0), ((5.0, 1.0, 1.0), 0.0)]
+)
+def test_the_share_of_turning_is_that_of_the_median_stone_by_mass(masses, share):
+    """Pushed by 20 mm at a height of 2 m, stones that rock turn by 10 mrad; one turns by half of it, one slides."""
+    rig = Rig((1.0, 0.0, 0.0), 2.0, 1e3)
+    axis = rig.axes[1]
+    turned = np.array(
+        [Rotation.from_rotvec(angle * axis).as_matrix() for angle in (0.0, 0.005, 0.01, 0.3, 0.3)]
+    )
+    blocks = [SimpleNamespace(code=code) for code in ("A", "B", "C", "foot", BEAM)]
+    model = SimpleNamespace(
+        mass=np.array([*masses, 9.0, 9.0]),
+        fixed=np.array([False, False, False, True, False]),
+        scene=SimpleNamespace(blocks=blocks),
+    )
+    settled = SimpleNamespace(rotation=np.tile(Rotation.from_rotvec([0.0, 0.0, 0.4]).as_matrix(), (5, 1, 1)))
+    end = SimpleNamespace(after=SimpleNamespace(rotation=turned @ settled.rotation))
+    way = np.array([0.01, 0.02])
+    test = LoadingTest(way, way, way, way, rig, model, settled, None, end, 0.0, 0, 0.0, False)
+    assert test.free.tolist() == [True, True, True, False, False]
+    assert test.turning == pytest.approx(share, abs=1e-9)
+
+
+def test_jaws_rise_as_the_points_do_that_they_touched_first():
+    contacts = SimpleNamespace(
+        bodies=np.array([[0, 3], [3, 1], [0, 1]]),
+        arm=np.array([[[0.5, 0, 0.2], [0, 0, 0]], [[0, 0, 0], [0.5, 0, 0.4]], [[9.0, 9, 9], [9, 9, 9]]]),
+    )
+    start = SimpleNamespace(
+        centre=np.array([[0.0, 0, 1], [0, 0, 2], [0, 0, 0], [0, 0, 0]]),
+        rotation=np.tile(np.eye(3), (4, 1, 1)),
+    )
+    pushed = _Pushed(SimpleNamespace(contacts=contacts), np.array([3]), start)
+    assert pushed.rise(start) == 0.0
+    # the first is lifted by 2 cm; the second turns by 1/10, which lifts its arm of half a metre by 5 cm
+    turn = Rotation.from_rotvec([0.0, -np.arcsin(0.1), 0.0]).as_matrix()
+    lean = 0.4 * (1.0 - np.cos(np.arcsin(0.1)))
+    later = SimpleNamespace(
+        centre=start.centre + np.outer([0.02, 0.0, 9.0, 9.0], [0.0, 0.0, 1.0]), rotation=start.rotation.copy()
+    )
+    later.rotation[1] = turn
+    assert pushed.rise(later) == pytest.approx(0.5 * (0.02 + 0.05 - lean))
+    alone = _Pushed(SimpleNamespace(contacts=contacts), np.array([2]), start)
+    assert alone.rise(later) == 0.0
