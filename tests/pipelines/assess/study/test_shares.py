@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from ground.errors import SceneError
+from pipelines.assess.questions import parse_question
 from pipelines.assess.study import actions, estimates, gradient, prepare, summary
 from pipelines.assess.study.inputs.distributions import Distribution
 from pipelines.assess.study.inputs.moved import MovedStones
 from pipelines.assess.study.inputs.unknowns import Unknown, Unknowns
 from pipelines.assess.study.methods.failure import Failure
 from pipelines.assess.study.methods.first_order import FirstOrder
-from pipelines.assess.study.settings import Acts, InputTable, InputType, Shape
+from pipelines.assess.study.quantities import live_load
+from pipelines.assess.study.settings import Acts, InputTable, InputType, QuantityTable, Shape
 
 SPREAD = Distribution(Shape.NORMAL, 0.0, 2.0)
 
@@ -192,7 +194,7 @@ def test_a_first_order_that_is_not_good_enough_is_told_by_how_much():
     estimates = SimpleNamespace(
         subset=None, designs=[], linear=None, gradient=None, weights=None, values={}, indices=None
     )
-    (text,) = summary._cautions(None, estimates, {"linear": linear, "faults": []})
+    (text,) = summary._cautions(estimates, {"linear": linear, "faults": []})
     assert "along depth of A the quantity departs from it by 37 % of a standard deviation" in text
     side = {"along": "depth", "below": 0.5, "above": 0.25}
     fault = {"count": 4, "reason": "it fell"}
@@ -227,3 +229,17 @@ def test_levels_of_a_curve_go_from_the_least_to_the_largest_value():
 
 def test_further_design_points_are_sought_along_what_stones_have_in_common():
     assert estimates._starts(problem()) == [0, 1, 4]
+
+
+@pytest.mark.parametrize(
+    ("words", "direction"),
+    [("horizontal x", (np.cos(0.3), np.sin(0.3), 0.0)), ("horizontal y", (-np.sin(0.3), np.cos(0.3), 0.0))],
+)
+def test_a_push_turns_about_the_vertical_and_a_force_does_not(words, direction):
+    table = QuantityTable("bound", load=words)
+    assert live_load(table, 0.3).direction == pytest.approx(direction)
+    assert live_load(table).direction == parse_question(words).live.direction
+    force = QuantityTable("bound", load="force A 1 0 0")
+    assert live_load(force, 0.3).force == (1.0, 0.0, 0.0)
+    with pytest.raises(SceneError, match="does not grow"):
+        live_load(QuantityTable("bound", load="thickness"))
