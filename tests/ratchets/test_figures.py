@@ -10,7 +10,7 @@ from tests.ratchets.figures import FIGURES, WORDS, identifier, parameters, per_1
 MOST = {
     "numbers of ground": 22,
     "numbers of moma": 20,
-    "numbers of survey": 300,
+    "numbers of survey": 299,
     "numbers of archmodel": 92,
     "numbers of mechanics": 740,
     "numbers of pipelines": 246,
