@@ -152,7 +152,7 @@ def _least_sum(design, heights, sound):
     solution, weights = np.zeros(6), np.empty(k)
     for i in range(k):
         weights[i] = 1.0 if sound[i] else 0.0
-    for _ in range(10 * MAX_ITERATIONS):
+    for _ in range(3 * MAX_ITERATIONS):
         _solve(*_normal(design, heights, weights, np.int64(4)), solution)
         for i in range(k):
             if sound[i]:

@@ -1,5 +1,7 @@
 """Contact planes of joints: the kernel's fit against numpy, and the grouping of joints by plane."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -56,10 +58,10 @@ def solved(design, heights, weight, prior=0.0, usual=0.0):
 
 
 def weights(residual, sound):
-    """Return Huber's weights, against the spread of sound corners; a hundredth for the others up to 25 mm."""
+    """Return Huber's weights, against the spread of sound corners; a hundredth for the others up to 30 mm."""
     spread = max(1.4826 * np.median(residual[sound]), 1e-4) if sound.any() else 1e-4
     residual = np.maximum(residual, 1e-300)
-    worn = 0.01 * np.minimum(1.0, 0.025 / residual)
+    worn = 0.01 * np.minimum(1.0, 0.03 / residual)
     return np.where(sound, np.minimum(1.0, 1.5 * spread / residual), worn)
 
 
@@ -68,7 +70,7 @@ def robust(design, heights, sound, prior, usual):
     weight, previous = np.where(sound, 1.0, 0.01), 0.0
     if design.shape[1] == 4 and sound.sum() >= 12:
         weight = weights(np.abs(heights - design @ least_sum(design, heights, sound)), sound)
-    for _ in range(30):
+    for _ in range(100):
         solution = solved(design, heights, weight, prior, usual)
         residual = np.abs(heights - design @ solution)
         left = (weight * residual**2).sum() / weight.sum()
@@ -108,7 +110,7 @@ def twin_fit(points, hands, sound, usual, straightness, scale):
     if min(above, below) >= 4:
         wedge, less = robust(design, z, sound, prior, usual)
         opening = np.hypot(*wedge[4:]) / scale
-        if opening > 0.035 and less < 0.1 * left and np.sqrt(less) < 0.25 * straightness:
+        if opening > math.radians(2.0) and less < 0.1 * left and np.sqrt(less) < 0.25 * straightness:
             unknowns, solution = 6, wedge
     if off(solution)[1] > 0.0:
         start, flat = solution, np.append(least_sum(design[:, :4], z, sound), [0.0, 0.0])
