@@ -199,7 +199,7 @@ def test_a_first_order_that_is_not_good_enough_is_told_by_how_much():
     side = {"along": "depth", "below": 0.5, "above": 0.25}
     fault = {"count": 4, "reason": "it fell"}
     found = summary._cautions(
-        None, estimates, {"linear": linear | {"linear": True, "sides": [side]}, "faults": [fault]}
+        estimates, {"linear": linear | {"linear": True, "sides": [side]}, "faults": [fault]}
     )
     assert "the derivative by depth is 0.5 below its mean and 0.25 above" in found[0]
     assert found[1].startswith("4 samples have no answer, as the first: it fell")
