@@ -84,7 +84,6 @@ _SECOND_PLANE = (
     _CURVED + _SEARCH
 )  # squares that a second plane must explain: 3 parameters at 0.1 %, 200 lines tried
 _WIDER = ODDS  # advantage in likelihood that wider scatter needs as an explanation
-_STEEPEST = STEEPEST  # a second plane turned farther is another side of the stone, or outliers
 _SCATTERED = 1.0 / 3.0  # share of points off the plane beyond which they are not isolated
 
 
@@ -220,7 +219,7 @@ def _bevelled(face: _Heights) -> tuple[float, FaceShape] | None:
     if math.isnan(plane[2]):
         return score, _strip(beyond, face)
     angle = math.atan(math.hypot(plane[1], plane[2]))
-    if angle > _STEEPEST:
+    if angle > STEEPEST:
         return None
     across = direction[0] * face.u[second_side] + direction[1] * face.v[second_side]
     deviation = 1.0 / math.sqrt(float(((face.root[second_side] * (across - across.mean())) ** 2).sum()))

@@ -12,8 +12,6 @@ from survey.geometry.convex_parts import convex_parts
 from survey.geometry.solids import BOX, Solid, area_vector, volume_of
 from survey.geometry.watertight import triangulate
 
-_MANY = MANY  # least number of faces of a solid that is tried as a storey of infill first
-
 
 def stone_parts(solid: Solid) -> tuple[Solid, ...]:
     """Cut a stone into convex parts; a storey of infill, which has hundreds of faces, by its own grid.
@@ -27,7 +25,7 @@ def stone_parts(solid: Solid) -> tuple[Solid, ...]:
     GeometryError
         if it has too many parts
     """
-    return (grid_parts(solid) if len(solid.faces) > _MANY else None) or convex_parts(solid)
+    return (grid_parts(solid) if len(solid.faces) > MANY else None) or convex_parts(solid)
 
 
 Box = tuple[tuple[int, int], ...]

@@ -26,7 +26,6 @@ _SMALL = 0.03  # largest hole that is covered, over the area of the surface
 _CORNERS = 400  # most corners of such a hole
 _SLIT = 0.005  # widest slit that is brought together, over the size of the surface
 _REACH = 4.0  # distance across which a slit is brought together, over its mean width
-_FLAT = FLAT  # warp of a hole that is covered by one face, over its size
 
 
 @dataclass(frozen=True)
@@ -330,7 +329,7 @@ def _covers(
 def _cover(vertices: Array, ring: list[int], taken: set[Edge]) -> list[Polygon] | None:
     """Return faces over a ring, without an edge that others have; None if there are none."""
     size = float(np.linalg.norm(np.ptp(vertices[ring], axis=0)))
-    if warp(vertices[ring]) <= _FLAT * size:
+    if warp(vertices[ring]) <= FLAT * size:
         return [tuple(ring)]
     border = {(min(edge), max(edge)) for edge in _edges(tuple(ring))}
     for start in range(len(ring)):

@@ -40,7 +40,6 @@ from survey.orientation.network import Control, Network, listed
 _GOOD = 5e-4  # the same, below which no other start is tried
 _LARGE = SIGNIFICANT  # σ₀ from which the model is doubted rather than the marks
 _MANY = TENTH  # part of the marks left out, from which it is
-_MOST = MOST  # part of the marks of one photograph left out, from which it is doubted as a whole
 _SMALL = 1500  # parameters of the cameras below which one thread of BLAS is faster than several
 
 
@@ -139,7 +138,7 @@ def orient(network: Network, blunders: Blunders = "report") -> Orientation:
 
 def _doubted(result: Orientation) -> bool:
     """Return whether the marks fit badly, or so many were left out that something else is wrong."""
-    return _misfits(result) or bool((_removed_parts(result) > _MOST).any())
+    return _misfits(result) or bool((_removed_parts(result) > MOST).any())
 
 
 def _misfits(result: Orientation) -> bool:
