@@ -10,6 +10,7 @@ from ground.errors import SceneError
 from mechanics.dynamics.outcome import Outcome
 from mechanics.limit import confirm as confirm_module
 from mechanics.limit import held
+from mechanics.limit import loading_test as loading
 from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import ConfirmationRun, confirm, likeness
 from mechanics.limit.joints import resultants, stress_blocks
@@ -462,3 +463,33 @@ def test_jaws_rise_as_the_points_do_that_they_touched_first():
     assert pushed.rise(later) == pytest.approx(0.5 * (0.02 + 0.05 - lean))
     alone = _Pushed(SimpleNamespace(contacts=contacts), np.array([2]), start)
     assert alone.rise(later) == 0.0
+
+
+def test_jaws_go_at_a_hundredth_of_the_speed_of_a_fall_through_their_way(monkeypatch):
+    class Caught(Exception):
+        pass
+
+    def caught(scene, rig, path):
+        raise Caught(path, scene.time)
+
+    monkeypatch.setattr(loading, "rigged", caught)
+    stone = scene(brick("a", (0, 0, 0), (0.6, 0.2, 1.0)))
+    with pytest.raises(Caught) as raised:
+        loading.loading_test(stone, Rig((1.0, 0.0, 0.0), 1.0, 1e3), (0.01, -0.02), 1e-3)
+    path, time = raised.value.args
+    speed = 0.01 * np.sqrt(2.0 * 9.81 * 0.02)
+    assert path.until == pytest.approx((0.01 + 0.03) / speed)
+    assert time.step == pytest.approx(1e-3 / speed)
+    assert time.duration == pytest.approx(path.until + time.step)
+
+
+def test_stones_that_do_not_come_to_rest_are_named_the_farthest_first(monkeypatch):
+    ways = np.array([0.01, 0.03, 0.0149, 0.0151, 0.9])
+    monkeypatch.setattr(loading, "displacement", lambda *_: ways)
+    blocks = [SimpleNamespace(code=code) for code in ("A", "B", "C", "D", BEAM)]
+    model = SimpleNamespace(fixed=np.zeros(5, bool), scene=SimpleNamespace(blocks=blocks, name="wall"))
+    begin = SimpleNamespace(centre=np.arange(15.0).reshape(5, 3))
+    # half of the way of the farthest stone, the beam left out
+    assert "fallen: B at (3.00, 4.00, 5.00) m by 30 mm, D at (9.00, 10.00, 11.00) m by 15.1 mm" in (
+        loading._restless(model, begin, None).what
+    )

@@ -1,10 +1,13 @@
 """Pictures that are no masks of stones: classes, white mortar, resampled colours; stones joined by a bridge."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from ground.errors import SurveyError, UsageError
+from survey.clouds.outlines.classes import check_stones
 from survey.clouds.outlines.reading import read_outlines
 from tests.paths import ROOT
 
@@ -148,3 +151,18 @@ def test_the_colours_of_a_line_drawing_are_listed(tmp_path):
     with pytest.raises(SurveyError, match=r"no 0 among them.*--layer: #c80000, #ffffff"):
         read_outlines(path)
     assert len(read_outlines(path, layer="#ffffff").outlines) == ROWS * COLUMNS
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("thick", "refused"), [(2, True), (3, False)])
+def test_colours_two_pixels_thick_are_rims(thick, refused, turned):
+    """Two areas, and four stripes between them: those of three pixels have a middle."""
+    rows = np.concatenate([np.full(10, 1), np.repeat([3, 4, 5, 6], thick), np.full(10, 2)])
+    numbers = np.repeat(rows[:, None], 12, axis=1)
+    numbers = numbers.T.copy() if turned else numbers
+    values = np.arange(7)
+    if refused:
+        with pytest.raises(SurveyError, match="4 of 7 numbers or colours are thin rims"):
+            check_stones(numbers, values, False, Path("a.png"))
+    else:
+        check_stones(numbers, values, False, Path("a.png"))

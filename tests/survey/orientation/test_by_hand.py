@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ground.errors import GeometryError, SurveyError
-from survey.orientation.bundle import agreement, control, orient, resection, start
+from survey.orientation.bundle import agreement, control, orient, resection, soundness, start
 from survey.orientation.bundle.resection import essential_orientations, similarity_between
 from survey.orientation.bundle.start import swapped
 
@@ -228,3 +228,20 @@ def test_pairs_with_most_common_points_come_first_and_need_six():
     assert made[0][1].tolist() == [0.0, 0.0, 0.0]
     with pytest.raises(GeometryError, match="P0 and P1 share 5 points, no pair more"):
         list(start._pairs(paired(5), np.concatenate([first[:5], second[:5], first[:3]])))
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(1, "1 control point (A) cannot"), (2, "2 control points (A, B) cannot")]
+)
+def test_fewer_than_three_control_points_hold_no_photographs(count, words):
+    gcps = tuple(
+        SimpleNamespace(point=k, place=np.eye(3)[k], check=False, where="c.csv:1") for k in range(count)
+    )
+    photo = SimpleNamespace(observed_station=None, fixed=False, where="")
+    about = SimpleNamespace(
+        names=("A", "B"), point=np.array([0, 1, 0, 1]), photo=np.array([0, 0, 1, 1]), control=gcps,
+        photos=(photo, photo), path="n",
+    )  # fmt: skip
+    with pytest.raises(SurveyError) as raised:
+        soundness._check_control(about)
+    assert words in raised.value.what

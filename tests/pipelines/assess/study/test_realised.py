@@ -9,6 +9,7 @@ import pytest
 
 from ground.errors import SceneError
 from mechanics.stones.materials import Material
+from pipelines.assess.study.file import _check_input
 from pipelines.assess.study.inputs import realise
 from pipelines.assess.study.inputs.distributions import Distribution
 from pipelines.assess.study.inputs.realise import changed_stones
@@ -235,3 +236,16 @@ def test_correlated_unknowns_move_together_and_their_gradient_follows():
         for step in 0.1 * np.eye(3)
     ]
     assert unknowns.gradient(point, slope) == pytest.approx(by_differences)
+
+
+@pytest.mark.parametrize(
+    ("mode", "fits"),
+    [(None, True), (1800.0, True), (2400.0, True), (1700.0, False), (2500.0, False)],
+)
+def test_the_mode_of_a_triangle_lies_within_its_ends_and_need_not_be_stated(mode, fits):
+    table = InputTable(InputType.DENSITY, distribution=Shape.TRIANGULAR, low=1800.0, high=2400.0, mode=mode)
+    if fits:
+        _check_input(table, None)
+    else:
+        with pytest.raises(SceneError):
+            _check_input(table, None)
