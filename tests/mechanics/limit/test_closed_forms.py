@@ -15,7 +15,7 @@ from mechanics.limit.assembly import assembly
 from mechanics.limit.confirm import ConfirmationRun, confirm, likeness
 from mechanics.limit.joints import resultants, stress_blocks
 from mechanics.limit.kinematic import kinematics
-from mechanics.limit.limit_load import Flow, Mechanism, limit_load, mechanism
+from mechanics.limit.limit_load import Flow, Mechanism, limit_load, mechanism, slides_along_one_line
 from mechanics.limit.live_loads import Acceleration, PointForce, SpreadForce, levers
 from mechanics.limit.loading_test import JawPath, LoadingTest, _Pushed
 from mechanics.limit.pushover import _Run
@@ -493,3 +493,24 @@ def test_stones_that_do_not_come_to_rest_are_named_the_farthest_first(monkeypatc
     assert "fallen: B at (3.00, 4.00, 5.00) m by 30 mm, D at (9.00, 10.00, 11.00) m by 15.1 mm" in (
         loading._restless(model, begin, None).what
     )
+
+
+@pytest.mark.parametrize(
+    ("degrees", "spin", "along"),
+    [(0.0, 0.0, True), (2.0, 0.0, True), (6.0, 0.0, False), (0.0, 0.05, True), (0.0, 0.4, False)],
+,
+)
+def test_stones_slide_along_one_line_within_a_few_degrees_and_without_turning(degrees, spin, along):
+    """Two stones of a size of 0.4 m; a spin of 0.05 rad/s moves its corners by a hundredth of the way."""
+    angle = np.radians(degrees)
+    velocity = np.zeros((3, 6))
+    velocity[1, 0] = 1.0
+    velocity[2, :2] = np.cos(angle), np.sin(angle)
+    velocity[2, 5] = spin
+    on = SimpleNamespace(
+        contacts=SimpleNamespace(bodies=np.zeros((0, 2), int), frame=np.zeros((0, 3, 3))),
+        model=SimpleNamespace(surfaces=SimpleNamespace(size=np.full(3, 0.4))),
+    )
+    moves = Mechanism(velocity, np.array([0.0, 1.0, 1.0]), np.zeros(0, bool), np.zeros(0, bool))
+    limit = SimpleNamespace(mechanism=moves, force=np.zeros((0, 3)))
+    assert slides_along_one_line(on, limit) == along
