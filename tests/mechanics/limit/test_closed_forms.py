@@ -498,7 +498,6 @@ def test_stones_that_do_not_come_to_rest_are_named_the_farthest_first(monkeypatc
 @pytest.mark.parametrize(
     ("degrees", "spin", "along"),
     [(0.0, 0.0, True), (2.0, 0.0, True), (6.0, 0.0, False), (0.0, 0.05, True), (0.0, 0.4, False)],
-,
 )
 def test_stones_slide_along_one_line_within_a_few_degrees_and_without_turning(degrees, spin, along):
     """Two stones of a size of 0.4 m; a spin of 0.05 rad/s moves its corners by a hundredth of the way."""
