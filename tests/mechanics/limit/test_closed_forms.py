@@ -513,3 +513,14 @@ def test_stones_slide_along_one_line_within_a_few_degrees_and_without_turning(de
     moves = Mechanism(velocity, np.array([0.0, 1.0, 1.0]), np.zeros(0, bool), np.zeros(0, bool))
     limit = SimpleNamespace(mechanism=moves, force=np.zeros((0, 3)))
     assert slides_along_one_line(on, limit) == along
+
+
+@pytest.mark.parametrize(("candidate", "first"), [(0.5, 0.5), (0.5049, 0.5), (None, 0.998), (0.999, 0.998)])
+def test_the_search_begins_at_a_whole_hundredth_of_the_bound_or_next_to_it(monkeypatch, candidate, first):
+    steps = Stepping(0.47)
+    monkeypatch.setattr(held, "_Steps", lambda on, live: steps)
+    monkeypatch.setattr(held, "_falling", lambda on, trial: "falls")
+    found = held.held_limit(None, None, SimpleNamespace(multiplier=1.0), candidate)
+    assert steps.tried[:2] == [0.0, pytest.approx(first)]
+    assert found.held < 0.47 <= found.lost
+    assert found.lost - found.held == pytest.approx(0.002)

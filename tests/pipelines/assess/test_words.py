@@ -296,3 +296,14 @@ def test_a_course_tells_of_its_two_stones_between_which_most_moved():
         "  course 4: B lies 12.0 ± 5.0 mm below A; the movement makes it 10.0 mm"
     )
     assert dating._course(line, frozenset({"A", "B"})) is None
+
+
+@pytest.mark.parametrize(
+    ("span", "off", "at_bound"),
+    [(1.0, 1e-7, True), (1.0, 1e-4, False), (1e4, 1e-3, True), (1e-4, 1e-8, False)],
+)
+def test_an_amplitude_is_at_a_bound_within_a_millionth_of_its_range(span, off, at_bound):
+    unknown = Unknown("settlement", "m", 0.0, -0.5 * span, 0.5 * span)
+    made = fitted((0.5 * span - off,), covariance=((1e-12,),))
+    (found,) = estimates([unknown], made, 10)
+    assert found.at_bound == at_bound
