@@ -173,13 +173,14 @@ def _opened_list(path: Path, options: ReadingOptions, form: str) -> SurveyStream
 
 
 def _further_titles(rows: AnyRows, ahead: Sequence[tuple[int, Any]]) -> int:
-    """Return the number of rows before the first point that have one number at most where coordinates stand."""
+    """Return the number of rows before the first that begins with the number of a point, or has coordinates."""
     for count, (number, row) in enumerate(ahead[:_TITLES]):
         try:
             cells = rows.cells(row, number, 5)
         except SurveyError:  # told when the row is read
             return count
-        if sum(is_number(cell, rows.delimiter != ",") for cell in cells[1:4]) > 1:
+        numbers = [is_number(cell, rows.delimiter != ",") for cell in cells[:4]]
+        if numbers[0] or sum(numbers) > 1:
             return count
     return 0
 
