@@ -524,3 +524,39 @@ def test_the_search_begins_at_a_whole_hundredth_of_the_bound_or_next_to_it(monke
     assert steps.tried[:2] == [0.0, pytest.approx(first)]
     assert found.held < 0.47 <= found.lost
     assert found.lost - found.held == pytest.approx(0.002)
+
+
+def curve(displacement, force, inertia=None):
+    """A test with a curve by hand, in metres and newtons."""
+    places, forces = np.array(displacement, dtype=float), np.array(force, dtype=float)
+    lost = np.zeros(len(places)) if inertia is None else np.array(inertia, dtype=float)
+    rig = Rig((1.0, 0.0, 0.0), 1.1, 40e3)
+    return LoadingTest(places, forces, lost, places, rig, None, None, None, None, 0.0, 0, 0.0, False)
+
+
+def test_secants_are_taken_where_the_curve_first_reaches_their_share_of_the_largest_force():
+    # a polygon through (1, 20), (2, 30) and (4, 100)
+    test = curve([1.0, 2.0, 4.0, 5.0], [20.0, 30.0, 100.0, 60.0])
+    assert test.early_stiffness == pytest.approx(15.0 / 0.75)
+    assert test.stiffness == pytest.approx(30.0 / 2.0)
+    assert test.secant(0.65) == pytest.approx(65.0 / 3.0)
+    backwards = curve([-1.0, -2.0, -4.0], [-20.0, -30.0, -100.0])
+    assert backwards.secant(0.65) == pytest.approx(65.0 / 3.0)
+
+
+def test_a_curve_is_that_of_its_first_branch_and_ends_there():
+    test = curve([1.0, 2.0, 1.0, -1.0, -3.0], [10.0, 40.0, 5.0, -9.0, -50.0])
+    assert test.first_branch == 2
+    assert test.at(np.array([0.5, 1.0, 1.5, 2.0])) == pytest.approx([5.0, 10.0, 25.0, 40.0])
+    assert np.isnan(test.at(np.array([2.1]))).all()
+    turned = curve([-1.0, -2.0, -1.5], [-10.0, -40.0, -5.0])
+    assert turned.first_branch == 2
+    assert turned.at(np.array([-0.5, -1.5])) == pytest.approx([-5.0, -25.0])
+    assert curve([1.0, 2.0], [10.0, 40.0]).first_branch == 2
+
+
+def test_strengths_are_the_largest_forces_of_calm_steps_each_way():
+    test = curve([1.0, 2.0, -1.0, -2.0], [40.0, 90.0, -60.0, -100.0], [0.5, 1.1, -0.9, 1.0])
+    assert test.calm.tolist() == [True, False, True, True]
+    assert test.strength == (40.0, -100.0)
+    assert curve([1.0], [10.0]).strength == (10.0, 0.0)

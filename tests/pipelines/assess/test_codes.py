@@ -123,3 +123,11 @@ def test_above_the_ground_the_secant_is_that_of_the_floor(tmp_path, monkeypatch)
     demand = spectral * 0.5 * 9 / 7 * share**2 / np.sqrt((1 - share) ** 2 + 0.02 * share)
     found = named(check_code("ntc2008", HIGH, overturning()), "nonlinear, above the ground")
     assert found.demand == pytest.approx(demand)
+
+
+def test_the_linear_check_above_the_ground_of_2009_has_the_first_mode_of_the_building():
+    """ψ = 6/12, γ = 3·3/(2·3 + 1), and Se(T1) of the plateau or beyond it over q = 2."""
+    found = named(check_code("ntc2008", HIGH, overturning()), "linear, above the ground")
+    # T1 = 0.4 s lies beyond TC = 0.35 s
+    spectrum = 0.15 * G * 2.5 * 0.35 / 0.4
+    assert found.demand == pytest.approx(spectrum * 0.5 * (9.0 / 7.0) / 2.0)

@@ -8,7 +8,6 @@ import pytest
 from scipy.stats import norm
 
 from ground.errors import UsageError
-from mechanics.limit.loading_test import LoadingTest
 from mechanics.scene.laws.cohesive_zone import CohesiveZone
 from mechanics.scene.laws.dry_joint import DryJoint
 from mechanics.scene.laws.elastic_joint import ElasticJoint
@@ -109,15 +108,6 @@ def test_fracture_energy_varies_with_the_strength_so_that_a_bond_softens_as_far(
     assert (found.shear, found.energy_shear) == (2e5, 80.0)
 
 
-def curve(displacement, force, inertia=None):
-    """A test with a curve by hand, in metres and newtons."""
-    places = np.array(displacement, dtype=float)
-    lost = np.zeros(len(places)) if inertia is None else np.array(inertia, dtype=float)
-    return LoadingTest(
-        places, np.array(force, dtype=float), lost, places, RIG, None, None, None, None, 0.0, 0, 0.0, False
-    )
-
-
 def test_the_headline_tells_both_strengths_the_band_and_the_mechanism():
     test = SimpleNamespace(strength=(12340.0, -9876.0), turning=0.95)
     assert headline_of(test, None) == "bears 12.34 kN and -9.876 kN; it rocks"
@@ -174,31 +164,3 @@ def test_the_rig_is_described_in_its_units():
     assert push == "push along (1, 0, 0) to 10, -20 mm in turn"
     assert scatter == "coefficients of variation: friction 15 %"
     assert "no scatter" in _rig(SimpleNamespace(rig=RIG, to=(0.01,), scatter={}))[2]
-
-
-def test_secants_are_taken_where_the_curve_first_reaches_their_share_of_the_largest_force():
-    # a polygon through (1, 20), (2, 30) and (4, 100)
-    test = curve([1.0, 2.0, 4.0, 5.0], [20.0, 30.0, 100.0, 60.0])
-    assert test.early_stiffness == pytest.approx(15.0 / 0.75)
-    assert test.stiffness == pytest.approx(30.0 / 2.0)
-    assert test.secant(0.65) == pytest.approx(65.0 / 3.0)
-    backwards = curve([-1.0, -2.0, -4.0], [-20.0, -30.0, -100.0])
-    assert backwards.secant(0.65) == pytest.approx(65.0 / 3.0)
-
-
-def test_a_curve_is_that_of_its_first_branch_and_ends_there():
-    test = curve([1.0, 2.0, 1.0, -1.0, -3.0], [10.0, 40.0, 5.0, -9.0, -50.0])
-    assert test.first_branch == 2
-    assert test.at(np.array([0.5, 1.0, 1.5, 2.0])) == pytest.approx([5.0, 10.0, 25.0, 40.0])
-    assert np.isnan(test.at(np.array([2.1]))).all()
-    turned = curve([-1.0, -2.0, -1.5], [-10.0, -40.0, -5.0])
-    assert turned.first_branch == 2
-    assert turned.at(np.array([-0.5, -1.5])) == pytest.approx([-5.0, -25.0])
-    assert curve([1.0, 2.0], [10.0, 40.0]).first_branch == 2
-
-
-def test_strengths_are_the_largest_forces_of_calm_steps_each_way():
-    test = curve([1.0, 2.0, -1.0, -2.0], [40.0, 90.0, -60.0, -100.0], [0.5, 1.1, -0.9, 1.0])
-    assert test.calm.tolist() == [True, False, True, True]
-    assert test.strength == (40.0, -100.0)
-    assert curve([1.0], [10.0]).strength == (10.0, 0.0)
