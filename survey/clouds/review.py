@@ -27,7 +27,7 @@ _MIN_OUTLINES = SAMPLE  # outlines from which sizes have a usual range
 _UNSURE = MOST  # score below which a program is not sure of a mask
 _FEW_POINTS = 100  # points of a stone that is hardly measured
 _COVERED = LARGELY  # share of clear patches below which something covers a stone, or its mask leaks
-_TURNED = ALIKE  # angle of a face from the plane of its outline [degrees]
+_TURNED = ALIKE  # angle of a face from the plane of its outline [rad]
 
 
 def drawn_doubts(placed: Sequence[PlacedOutline], drawing: Drawing) -> list[Doubtful]:
@@ -122,9 +122,8 @@ def measured_doubts(outline: PlacedOutline, plane: Array, numbers: Array) -> Ite
         text = f"{clear:.0%} of its patches are clear: something covers it, or its mask reaches beyond it"
         yield Doubtful(code, "covered", text, where)
     if (turned := float(np.arctan(np.hypot(*plane[:2])))) > _TURNED:
-        yield Doubtful(
-            code, "turned", f"its face is turned {turned:.0f}° from the plane of its outline", where
-        )
+        text = f"its face is turned {np.degrees(turned):.0f}° from the plane of its outline"
+        yield Doubtful(code, "turned", text, where)
 
 
 def _overlaps_in_space(placed: Sequence[PlacedOutline]) -> Iterator[Doubtful]:

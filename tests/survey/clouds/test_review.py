@@ -93,3 +93,10 @@ def test_a_face_is_doubtful_where_it_is_turned_covered_or_hardly_measured(
     assert isinstance(placed, PlacedOutline)
     found = measured_doubts(placed, np.array([*slopes, 0.0]), np.array([0.0, 0.0, clear, count]))
     assert [doubt.reason for doubt in found] == reasons
+
+
+def test_the_turn_of_a_face_is_told_in_degrees() -> None:
+    (placed,) = place_outlines([outline(SQUARE)], None, ())
+    slopes = np.array([np.tan(np.radians(37.0)), 0.0, 0.0])
+    (doubt,) = measured_doubts(placed, slopes, np.array([0.0, 0.0, 1.0, 500.0]))
+    assert "turned 37° from" in doubt.text
