@@ -56,7 +56,7 @@ class Assembly:
     remarks : keys and laws without effect, limits of the stresses, and stones whose warped faces were made plane
     inputs : what went into the run, lines of text by title, for its report
     structures : courses, arches and other structures of the database, with those of its stones that are here
-    stages : of building, for `mechanics.simulate_stages`; the loads are theirs, and `scene` has none. None: one scene
+    stages : of building, for `simulate_stages`; the loads are theirs, and `scene` has none. None: one scene
     """
 
     scene: Scene

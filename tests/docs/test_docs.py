@@ -177,6 +177,21 @@ def test_the_design_pages_name_files_that_exist_and_all_stand_in_the_index():
             assert (ROOT / path).exists(), (page.name, path)
 
 
+def test_tests_and_modules_that_pages_name_exist():
+    """Names of tests may lack the first folders; files of changes of the past are not asked for."""
+    named = 0
+    for page in (*ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md"), ROOT / "CONTRIBUTING.md"):
+        text = page.read_text(encoding="utf-8")
+        for path in re.findall(r"`((?:\w+/)*test_\w+\.py)`", text):
+            named += 1
+            assert (ROOT / path).exists() or any(ROOT.glob(f"tests/**/{path}")), (page.name, path)
+        for module in re.findall(r"python -m ((?:archmodel|benchmarks|synthetic|tests)(?:\.\w+)*)", text):
+            named += 1
+            path = ROOT.joinpath(*module.split("."))
+            assert path.with_suffix(".py").exists() or (path / "__main__.py").exists(), (page.name, module)
+    assert named > 50
+
+
 def test_things_are_made_where_the_page_on_rooms_says():
     page = (ROOT / "docs/design/packages-and-rooms.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| [^|]+ \| `([\w.]+)` \| `([\w/]+\.py)` \|", page, re.MULTILINE)

@@ -1,6 +1,6 @@
 """Numba kernels of touching faces: the intersection of two polygons, seen square to the joint between them.
 
-Solids are held as in `survey.geometry.adjacency.Polyhedra`, in coordinates about a place among them.
+Solids are held as in `survey.geometry.adjacency.SolidArrays`, in coordinates about a place among them.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Numba kernels of matching faces: opposite faces of two solids that lie in one plane within a tolerance.
 
-Solids are held as in `survey.geometry.adjacency.Polyhedra`, in coordinates about a place among them.
+Solids are held as in `survey.geometry.adjacency.SolidArrays`, in coordinates about a place among them.
 """
 
 import math

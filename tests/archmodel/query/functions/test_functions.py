@@ -1,4 +1,4 @@
-"""What the functions of expressions find in the furnished wall; what is there is seen in ``furnished.py``."""
+"""What the functions of expressions find in the wall that `tests.archmodel.known_wall` furnishes."""
 
 import pytest
 from sqlalchemy import select
