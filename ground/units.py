@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-CENTI, MILLI = 0.01, 0.001
+DECI, CENTI, MILLI = 0.1, 0.01, 0.001
 KILO = 1.0 / MILLI
 MEGA = KILO * KILO
 GIGA = KILO * MEGA
@@ -21,7 +21,7 @@ GRAVITY = 9.81
 
 LENGTHS: Mapping[str, float] = {
     "m": 1.0,
-    "dm": 10.0 * CENTI,
+    "dm": DECI,
     "cm": CENTI,
     "mm": MILLI,
     "ft": FOOT,

@@ -6,7 +6,7 @@ Compiled kernels hold them: after a change, remove `__pycache__/*.nbi`, by which
 import math
 from statistics import NormalDist
 
-from ground.units import CENTI, KILO, MILLI
+from ground.units import CENTI, DECI, KILO, MILLI
 
 # chance
 RARE = 0.001  # probability with which what is sound is rejected: Baarda's α₀
@@ -28,7 +28,7 @@ PER_MILLE = MILLI  # up to which a value is right
 PER_CENT = CENTI  # from which a difference is worth telling
 NEGLIGIBLE = 0.02  # of no account
 FEW = 0.05  # exceptions
-TENTH = 0.1  # up to which a value is nearly right
+TENTH = DECI  # up to which a value is nearly right
 SOME = 0.25  # from which a part counts
 MOST = 0.5
 LARGELY = 0.7  # clearly more than half
@@ -43,6 +43,7 @@ ENOUGH = 5  # values that have a median and a scatter: with fewer, it is uncerta
 SAMPLE = 12  # values from which what is usual is known: their scatter to a fifth
 PLACES = 24  # places along a line, or directions, at which something is looked for
 LARGEST = 12  # things of a list, the largest first, that a reader takes in
+ATTEMPTS = 12  # attempts at most, of what succeeds in the first or second as a rule
 MANY = 30  # values of which a single one hardly matters: their scatter is known to an eighth
 TRIALS = 300  # random trials, or first stones of a survey: shares are known to 3 %
 LISTED = 6  # names in a message
@@ -61,19 +62,19 @@ STEEPEST = math.radians(60.0)  # beyond which a face is another side of the ston
 
 # lengths [m]
 FARTHEST = KILO  # from a wall, that somebody measures it
-THINNEST = 1e-5  # of what is drawn or computed: less is no thickness
-FINEST = 1e-4  # better than any instrument measures a face of stone
+THINNEST = CENTI * MILLI  # of what is drawn or computed: less is no thickness
+FINEST = DECI * MILLI  # better than any instrument measures a face of stone
 LEAST = MILLI  # a millimetre, in which masons and surveyors count
 JOINT = CENTI  # usual width of a joint, and roughness of a face that is not dressed
 STEP = 0.02  # height of a step that is a joint, between beds that run through
 WEAR = 0.03  # depth of worn edges and of eroded mortar
 WIDEST_JOINT = 0.05
-BROKEN = 0.1  # length of what breaks off a corner, and of a bevel
+BROKEN = DECI  # length of what breaks off a corner, and of a bevel
 SMALL_STONE = 0.15  # length of a small stone
 STONE = 0.5  # length of a usual stone
 
 # rounding of lengths [m]
-TOUCHING = 1e-6  # distance of faces that meet
+TOUCHING = MILLI * MILLI  # distance of faces that meet
 ON_PLANE = 1e-8  # distance of corners from a plane that was computed
 ROUNDING = 1e-10  # distance of corners from the planes that made them
 

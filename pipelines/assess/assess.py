@@ -53,7 +53,7 @@ from pipelines.scene.fingerprint import digest, fingerprint
 from pipelines.scene.selection import select_groups, select_stones
 from pipelines.scene.site import Site
 from pipelines.scene.stages import refuse_stages
-from survey.conventions import MOST, SAMPLE
+from survey.conventions import ATTEMPTS, MOST
 
 INDEX = "assessment.json"
 """Index of the results of an assessment."""
@@ -72,7 +72,7 @@ REPORT = "report.html"
 
 _SOUND_FIRST = "limit loads need sound joints: mend the scene until `moma check` finds nothing"
 _LOOSE = MOST  # share of the stones that may be left out as loose, at most [-]
-_RUNS = SAMPLE  # by which a candidate is confirmed, at most
+_RUNS = ATTEMPTS  # by which a candidate is confirmed, at most
 
 
 @dataclass(frozen=True)

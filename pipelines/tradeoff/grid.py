@@ -8,12 +8,13 @@ from itertools import chain
 
 import numpy as np
 
+from ground.units import CENTI, DECI, MILLI
 from mechanics.scene.scene import Block, Fidelity, Method, Placement
 from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import SceneFile
 from pipelines.tuning.overlay import Overlay
 from pipelines.tuning.profiles import PROFILES
-from survey.conventions import FINEST, LEAST, PER_CENT, THINNEST
+from survey.conventions import PER_CENT
 
 _MESHES = (1, 2, 3, 4, 6)
 _CELLS = {
@@ -44,7 +45,7 @@ _LINEAR = 4.0  # time of linear over quadratic elements of as many unknowns: con
 _LOOSER = 100.0  # factor on tolerances of looser variants [-]
 _TIGHTER = 1.0 / _LOOSER  # factor on tolerances of tighter variants [-]
 _LOOSEST = PER_CENT  # largest tolerance; beyond it, contacts no longer obey their laws [-]
-_MOTION_ERRORS = (THINNEST, FINEST, LEAST)  # of the motion of rigid stones [m]
+_MOTION_ERRORS = (CENTI * MILLI, DECI * MILLI, MILLI)  # of the motion of rigid stones [m]
 _PROFILE = "profile"  # first word of the names of profiles
 
 

@@ -6,12 +6,12 @@ from types import MappingProxyType
 
 from ground.errors import UsageError
 from ground.toml.schema import nearest
+from ground.units import CENTI, MILLI
 from mechanics.scene.scene import Fidelity, Method, Placement, TimeSettings
 from mechanics.stones.meshing.elements import Element
 from pipelines.scene.file import SceneFile
 from pipelines.scene.selection import StoneModel
 from pipelines.tuning.overlay import Overlay, overlaid, typical_width
-from survey.conventions import LEAST, THINNEST, TOUCHING
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ _FAST = Profile(
         tolerance=1e-5,
         # with a looser one, rigid stones in steps of this length miss a balance of 10⁻⁴ and never come to rest
         velocity_tolerance=1e-5,
-        motion_error=LEAST,
+        motion_error=MILLI,
         max_iterations=2000,
     ),
     step=0.002,
@@ -73,7 +73,7 @@ _BALANCED = Profile(
         method=Method.AUTO,
         tolerance=1e-6,
         velocity_tolerance=1e-4,
-        motion_error=THINNEST,
+        motion_error=CENTI * MILLI,
         max_iterations=3000,
     ),
     step=0.001,
@@ -93,7 +93,7 @@ _ACCURATE = Profile(
         method=Method.AUTO,
         tolerance=1e-7,
         velocity_tolerance=1e-5,
-        motion_error=TOUCHING,
+        motion_error=MILLI * MILLI,
         max_iterations=5000,
     ),
     step=0.0005,

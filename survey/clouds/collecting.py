@@ -15,7 +15,7 @@ from survey.arrays import Array, Ints
 from survey.clouds._kernels.collect import Frames, Grid, Patches, Rings, Samples, collect
 from survey.clouds.placing import PlacedOutline
 from survey.clouds.points.chunks import PointCloud
-from survey.conventions import ENOUGH, JOINT, ROWS, SAMPLE, STEP
+from survey.conventions import ENOUGH, JOINT, SAMPLE, STEP
 
 _PATCHES = 36  # of a face: the fit of planes tells outliers apart best among 20 to 50 points
 _DENSE = ENOUGH  # points of a patch whose mean says something
@@ -25,7 +25,7 @@ _PATCH_POINTS = (
 )
 _SMALLEST = JOINT  # side of a patch: less than the roughness of a stone is long [m]
 _MAX_PATCHES = 144  # patches of a face that is much longer than high
-_CUBES = ROWS  # of space, 8 bytes each
+_CUBES = 2_000_000  # cubes of space, for each of which the outlines near it are listed: 16 MB of starts
 _FINEST = STEP  # side of a cube [m]
 
 

@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 
 from ground.statistics.scale import deviation
 from survey.arrays import Array, Bools, Ints
-from survey.conventions import GROUP, MAX_ROUNDS, MOST, ROUNDS, SAMPLE, TENTH
+from survey.conventions import GROUP, MAX_ROUNDS, MOST, ROUNDS, TENTH
 from survey.geometry.adjacency import SolidArrays
 from survey.joints._kernels import WORN
 from survey.joints.facing import FacePlanes, FacingFaces
@@ -22,7 +22,7 @@ from survey.joints.settings import JointSettings
 _FINE = MOST  # of the straightness: distance from the chain that is preferred for corners
 _MAX_OFF_SHARE = TENTH  # largest part of the sound corners that may be off the chain
 _MIN_LINKS = GROUP  # least number of links of a chain
-_MAX_CHAINS = SAMPLE  # largest number of chains of a bed
+_MAX_CHAINS = 12  # largest number of chains of a bed
 
 
 @dataclass(frozen=True)

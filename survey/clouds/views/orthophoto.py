@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.errors import SurveyError, UsageError
+from ground.units import DECI, MILLI
 from survey.arrays import Array, Bools
 from survey.clouds._kernels.paint import Canvas, paint
 from survey.clouds.points.chunks import PointCloud
 from survey.clouds.wall import Wall
 from survey.clouds.world import world_file
-from survey.conventions import ALIKE, FEW, FINEST, SOME, TRIALS, WIDEST_JOINT
+from survey.conventions import ALIKE, FEW, SOME, TRIALS, WIDEST_JOINT
 from survey.quality.facades import upright_frame
 
-DEPTH_STEP = FINEST
+DEPTH_STEP = DECI * MILLI
 """Step of the numbers of a depth map [m]."""
 
 _LARGEST = 40_000_000  # pixels: 800 MB of sums

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from ground.tables.numbers import shown
 from ground.tables.text_lines import TextLines
-from ground.units import CENTI, FOOT, MILLI
-from survey.conventions import TENTH
+from ground.units import CENTI, DECI, FOOT, MILLI
 from survey.formats.fields import code_of
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.reader import PointCollector
@@ -24,8 +23,8 @@ _WORD = re.compile(r"(\d{2})(....)([+-])(.+)")
 _LAST_DIGIT = {
     "0": MILLI,
     "1": MILLI * FOOT,
-    "6": TENTH * MILLI,
-    "7": TENTH * MILLI * FOOT,
+    "6": DECI * MILLI,
+    "7": DECI * MILLI * FOOT,
     "8": CENTI * MILLI,
 }
 """Length of the last digit of a coordinate by the character for its unit [m]."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.arrays import Array, Bools, Ints
-from survey.conventions import FEW, LARGELY, MANY, MAX_ROUNDS, MOST, NEARLY, PER_CENT, ROUNDING, SAME, TRIALS
+from survey.conventions import FEW, LARGELY, MAX_ROUNDS, MOST, NEARLY, PER_CENT, ROUNDING, SAME, TRIALS
 from survey.geometry.half_spaces import intersection
 from survey.geometry.solids import Solid, volume_of
 
@@ -23,7 +23,7 @@ _DIRECTIONS = TRIALS  # facets whose normals are tried for each plane
 _ALIGNED = NEARLY  # cosine of the angle between a facet and its plane while the plane is sought
 _LEANING = MOST  # the same when facets are given to the plane found: those of a rough face lean
 _MIN_FACE_SHARE = PER_CENT  # least area of a face over the whole surface
-_MAX_PLANES = MANY  # planes
+_MAX_PLANES = 30  # planes of a stone
 _COVERED = LARGELY  # least part of the surface that lies in the planes
 _VOLUME = FEW  # largest change of the volume: broken corners and edges are filled
 _CUT = ROUNDING  # distance within which corners are on a plane while cutting [m]

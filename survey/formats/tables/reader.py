@@ -22,7 +22,7 @@ from ground.tables.columns import LONGEST_HEAD, plain
 from ground.tables.decimals import Decimals
 from ground.tables.numbers import EMPTY, is_number, shown
 from ground.tables.rows import DATE_REMEDY, ListRows, Row, TextRows, open_rows
-from survey.conventions import LISTED, MANY, TRIALS
+from survey.conventions import LISTED, TRIALS
 from survey.formats.fields import CODE, KIND, NO_COURSE, NUMBERED_ANEW, code_of, parse_course
 from survey.formats.options import ReadingOptions
 from survey.formats.tables.axes import (
@@ -68,7 +68,7 @@ _LIST = {"pnezd": ("name", "y", "x", "z", "description"), "penzd": ("name", "x",
 _SEPARATORS = ("\t", ";", ",", "|", "")  # empty: any blanks
 _SAMPLE = TRIALS  # first stones, by which the order of the axes is judged: habits show in far fewer
 _LOOK_AHEAD = LONGEST_HEAD  # rows in which the first good one, or the names of the columns, must be found
-_TITLES = MANY  # rows before the names of the columns
+_TITLES = 30  # rows before the names of the columns
 _CACHED = 4096  # identities
 _LONGEST_NAME = 64
 _UNKNOWN = EMPTY | {""}

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from survey.arrays import Array
-from survey.conventions import PER_CENT, SAME, SAMPLE, VANISHING
+from survey.conventions import ATTEMPTS, PER_CENT, SAME, VANISHING
 
 TRIPLES = 60
 """Random triples tried: with half of the points wrong, one is free of them but once in (8/7)⁶⁰ = 3,000 cases."""
 
 _FIVES = TRIPLES  # random fives of pairs of rays tried
-_ENOUGH = SAMPLE  # of these, after which nearly all pairs may end the search
+_ENOUGH = ATTEMPTS  # of these, after which nearly all pairs may end the search
 _AGREES = PER_CENT  # angle between a ray and the direction of its point [rad]
 _PARALLEL = (
     VANISHING  # smallest eigenvalue of the sum of the projections across rays, below which they are parallel

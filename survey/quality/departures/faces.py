@@ -23,6 +23,7 @@ from scipy.spatial import cKDTree
 from ground.statistics.scale import spread
 from survey.arrays import Array
 from survey.conventions import (
+    ATTEMPTS,
     BROKEN,
     ENOUGH,
     FINEST,
@@ -30,7 +31,6 @@ from survey.conventions import (
     LEAST,
     PARALLEL,
     ROUNDS,
-    SAMPLE,
     STONE,
     TENTH,
     TUKEY,
@@ -71,7 +71,7 @@ _RANKS = {name: rank for rank, names in enumerate(_SIMPLEST_FIRST) for name in n
 _GRID = 8  # places along and up the wall at which ends, offsets and bulges are looked for
 _MIN_MOVED_STONES = GROUP  # stones that a shape must move
 _BESIDE = 1.0  # of the median size of a stone: distance from a straight joint to which a crack zigzags
-_TRIALS = SAMPLE  # by which the place of a shape is sharpened
+_TRIALS = ATTEMPTS  # by which the place of a shape is sharpened
 _STEP = TENTH  # of the median size of a stone: step of the derivatives of a bulge by its places
 
 

@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from survey.arrays import Array
-from survey.conventions import JOINT, STONE, TOUCHING
+from survey.conventions import JOINT, SAME, STONE, TOUCHING
 
 _JOINT = 0.08  # widest joint between two stones [m]; beyond is an opening, or the end of the wall
 _HEIGHTS = (0.7, 1.5)  # straight distances at which it is measured, about a metre [m]; their mean is taken
@@ -123,7 +123,7 @@ def _joints(faces: Sequence[Array], chosen: Sequence[int]) -> tuple[_Network, li
             at = node[first[k] + side], node[first[k] + (side + 1) % len(face)]
             on_side = [(0.0, at[0]), (1.0, at[1])]
             for i, share in _feet(corners[others], start, stop):
-                if TOUCHING < share < 1.0 - TOUCHING:
+                if SAME < share < 1.0 - SAME:
                     foot = network.add(start + share * (stop - start))
                     on_side.append((share, foot))
                 else:
