@@ -9,7 +9,7 @@ import numpy as np
 
 from mechanics.arrays import Array
 from pipelines.draw.elevations.sheet import FLAG, INK, PALE, PLAIN, new_sheet, save_sheet
-from survey.conventions import LISTED, NEGLIGIBLE, PER_CENT
+from survey.conventions import NEGLIGIBLE, PER_CENT
 from survey.orientation.oriented import Oriented
 from survey.orientation.projection import project
 
@@ -22,6 +22,7 @@ _NAMED = 40  # photographs named in the plan
 _PHOTOS = 24  # photographs whose residuals are drawn: those with the largest first
 _READABLE = 0.04  # length of a typical residual over the width of its photograph
 _PARTS = 8  # pieces of a side of an outline, which the lens bends
+_DRAWN = 6  # photographs on which outlines are drawn: those with most marks of stones
 _MARGIN = PER_CENT  # of the width of a photograph, shown around outlines
 _LONG = 1500  # pixels of the longer side of a picture that is laid under a drawing
 _FAINT = 0.75  # opacity of such a picture
@@ -211,7 +212,7 @@ def draw_outlines(
     }
     drawn_on = {stone.drawn for stone in stones}
     best = sorted(count, key=lambda name: (name not in drawn_on, -count[name]))
-    chosen = sorted(name for name in best[:LISTED] if count[name])
+    chosen = sorted(name for name in best[:_DRAWN] if count[name])
     columns = min(2, len(chosen))
     rows = -(-len(chosen) // columns)
     figure = new_sheet((11.0, 3.9 * rows))

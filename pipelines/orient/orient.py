@@ -100,11 +100,11 @@ def orient_photographs(project: Path | Project, folder: Path) -> OrientReport:
             photo["picture"] = _beside(read.pictures[photo["name"]], folder)
     with replacing(folder, INDEX) as fresh:
         pictures = draw_photographs(values, fresh, read.pictures)
-        for photo in read.write:
+        for form in read.write:
             try:
-                _WRITERS[photo](result.adjusted, fresh)
+                _WRITERS[form](result.adjusted, fresh)
             except SurveyError as error:
-                raise error.at(f'write = ["{photo}"]') from error
+                raise error.at(f'write = ["{form}"]') from error
         values["files"] = sorted([INDEX, "report.html", *(entry.name for entry in fresh.iterdir())])
         write_photographs_page(fresh / "report.html", values, pictures, version("moma-masonry"))
         write_orientation(fresh / INDEX, values)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from archmodel.store.stone_record import StoneRecord
-from ground.units import GRAVITY, KILO
+from ground.units import GIGA, GRAVITY, KILO
 from mechanics.arrays import Array, Ints
 from mechanics.scene.scene import Fidelity
 from pipelines.scene.file import SceneFile
@@ -22,7 +22,7 @@ _THIN = 0.8  # depth over that of the leaf below which a stone leaves a void beh
 _BEHIND = JOINT  # by which a stone must reach farther back to lie behind another: a joint [m]
 _SQUARE = math.degrees(PARALLEL)  # angle of faces that belong to one façade [°]
 _MANY_STEPS = 1e7  # an hour for the smallest scenes, at 0.3 ms for a step
-_ENDLESS_STEPS = 1e9  # days even for a single stone
+_ENDLESS_STEPS = GIGA  # days even for a single stone
 _LONG_STEP = 0.05  # in which a falling stone moves by its joint's width and more: g h² = 25 mm [s]
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechanics.arrays import Array
-from survey.conventions import ROUNDING, TOUCHING
+from survey.conventions import THINNEST, TOUCHING
 from survey.geometry.solids import Solid, area_vector
 from survey.joints.grown_leaf import Opening
 from survey.joints.report import ClosingReport, StoneJoint
@@ -213,7 +213,7 @@ def joint_polygon(first: Solid, second: Solid, normal: Array, centroid: Array) -
     along /= np.linalg.norm(along)
     axes = np.array([along, np.cross(normal, along)])
     best: Array | None = None
-    most = ROUNDING
+    most = THINNEST**2  # a smaller area [m²] is rounding
     for above in _sides(first, -normal, axes, centroid):
         for below in _sides(second, normal, axes, centroid):
             common = _clipped(above, below)

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ground.errors import UsageError
 from survey.arrays import Array, Ints
-from survey.conventions import VANISHING
+from survey.conventions import EPSILON
 from survey.geometry.convexity import is_convex, reflex_edges
 from survey.geometry.folds import fold
 from survey.geometry.plane_network import Settled, settle
@@ -83,7 +83,7 @@ class _Assembly:
                 return
             self._settled = settle(self._vertices, corner, plane)
             moved = np.linalg.norm(self._settled.vertices - self._vertices, axis=1)
-            np.maximum.at(moved, corner[np.abs(self._settled.residual) > VANISHING * self._size], np.inf)
+            np.maximum.at(moved, corner[np.abs(self._settled.residual) > EPSILON * self._size], np.inf)
             if moved.max() <= self._tolerance:
                 return
             self._let_go(moved)
