@@ -14,5 +14,6 @@ Public: `DatabaseError`, `ExchangeError`, `GeometryError`, `MeshError`, `Missing
 `UnsoundSceneError`, `UsageError`, `missing_library`, `storage_error`,
 `storing` (errors); `Setting`, `declared` (settings);
 `area_and_centroid` (polygons);
-`CENTI`, `DECI`, `FOOT`, `GIGA`, `GRAVITY`, `INCH`, `KILO`, `LENGTHS`, `MEGA`, `MILLI`, `POUND`, `PSI`, `SURVEY_FOOT` (units).
+`CENTI`, `DECI`, `FOOT`, `GIGA`, `GRAVITY`, `INCH`, `KILO`, `LENGTHS`, `MEGA`, `MILLI`, `POUND`, `PSI`,
+`SURVEY_FOOT` (units).
 """
