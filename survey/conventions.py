@@ -9,7 +9,7 @@ from statistics import NormalDist
 from ground.units import CENTI, DECI, KILO, MILLI
 
 # chance
-RARE = 0.001  # probability with which what is sound is rejected: Baarda's α₀
+RARE = MILLI  # probability with which what is sound is rejected: Baarda's α₀
 TAIL = 0.025  # probability beyond either end of a two-sided interval of 95 %
 CRITICAL = -NormalDist().inv_cdf(
     0.5 * RARE
@@ -79,7 +79,7 @@ ON_PLANE = 1e-8  # distance of corners from a plane that was computed
 ROUNDING = 1e-10  # distance of corners from the planes that made them
 
 # rounding of what has no unit, and of lengths over a size [-]
-SAME = 1e-6  # of volumes and angles that are the same
-FLAT = 1e-4  # warp, over its size, of what is plane and rounded to a few digits
+SAME = MILLI * MILLI  # of volumes and angles that are the same
+FLAT = DECI * MILLI  # warp, over its size, of what is plane and rounded to a few digits
 VANISHING = 1e-9  # of what is nothing
 EPSILON = 1e-12  # of the last step of an iteration that has converged

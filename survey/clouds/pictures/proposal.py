@@ -35,7 +35,7 @@ _REACH = {"coursed": 1.0, "rubble": 6.0}  # farthest mortar from the middle of a
 _HIDDEN = LARGELY  # part of a stone that something covers from which it is not proposed
 _SAME = 0.3  # part of the smaller outline that two tiles share from which it is the same stone
 _CHROMA = slice(1, 3)  # channels of a* and b*: those of lightness step at every edge of a shade
-_OPEN = _REACH["rubble"]  # size of an opening over the width of a joint
+_OPEN = 6.0  # size of an opening over the width of a joint
 
 
 @dataclass(frozen=True)

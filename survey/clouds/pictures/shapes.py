@@ -19,7 +19,7 @@ _MIN_CORNERS = CHECKED  # corners of an outline that has none to spare
 _BEVEL = 1.5  # length of a side that cuts a corner off, over the width of a joint
 _SIDE = 4.0  # length of what is seen of a side, over the width of a joint, from which it goes straight on when hidden
 _SQUARE = math.sin(ONE_WAY)  # sine of the angle between the sides beside it
-_MIN_STONE_WIDTH = _BEVEL  # width of a stone over that of a joint
+_MIN_STONE_WIDTH = 1.5  # width of a stone over that of a joint
 _SEEN = SOME  # contrast of mortar over the scatter of the wall from which its edge can be seen
 _PIXEL = (
     0.75  # standard deviation of a corner where two straight sides meet [px of the work]: of rendered walls

@@ -13,6 +13,7 @@ import numpy as np
 
 from ground.errors import SurveyError
 from ground.tables.grids import exchanged_grid
+from ground.units import DECI
 from survey.arrays import Array
 from survey.conventions import FARTHEST, MOST, TENTH
 from survey.formats.tables.point_table import TableStone
@@ -23,7 +24,7 @@ ORDERS = {"pnezd": "northing first", "penzd": "easting first"}
 """Order of the two level coordinates by format."""
 
 _WORDS = {"pnezd": ("pnezd", "pnez", "nez", "pneh", "neh"), "penzd": ("penzd", "penz", "enz", "penh", "enh")}
-_SAME = 0.1  # distance within which two lists place a station at one point: it is set up anew there [m]
+_SAME = DECI  # distance within which two lists place a station at one point: it is set up anew there [m]
 _PAIRS = 6  # least pairs of neighbouring stones, and least corners' turns, for a habit: by chance 1 in 64
 _HABIT = 1.0 - TENTH  # share of stones from which a habit is one: the others are slips
 _LEVEL = MOST  # horizontal share of a face's area below which it lies: left and right are not a wall's [-]

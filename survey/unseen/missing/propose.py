@@ -15,7 +15,6 @@ import numpy as np
 from survey.arrays import Array
 from survey.conventions import BROKEN, JOINT, ROUNDS, WIDEST_JOINT
 from survey.extrusion.extrusion import SurveyedBlock
-from survey.formats.options import SIGMA
 from survey.geometry.solids import area_vector
 from survey.unseen.missing.arches import ArchGap, arch_gaps, voussoir_outlines
 from survey.unseen.missing.faces import MissingFace, is_plausible, stone_of
@@ -26,7 +25,7 @@ from survey.unseen.missing.settings import MissingSettings
 from survey.unseen.missing.sides import Elevation, FlatStone, Line, elevations, meeting
 
 _LEFT, _RIGHT, _UPRIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.0, 1.0])
-_SCATTER = SIGMA  # metres: standard deviation of a stone's end about the middle of its joint
+_SCATTER = 0.003  # metres: standard deviation of a stone's end about the middle of its joint
 _TALL = WIDEST_JOINT  # metres: distance of ends of gaps of two courses below which they belong to one stone
 _BEHIND = WIDEST_JOINT  # metres: depth behind the face at which stones seen from elsewhere are compared
 _SPLIT_SIGMA = BROKEN  # metres: standard deviation of the joint between two missing stones
