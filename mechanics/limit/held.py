@@ -27,6 +27,7 @@ between its neighbours, the search is made again by what such a step says.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 
 import numpy as np
 
@@ -57,7 +58,8 @@ _CREEPS, _SURE = FURTHER * _MOVES, 1e-2
 _LIMITS, _ITERATIONS = (Newton.tolerance, Newton.velocity_tolerance), Auto.max_iterations
 # share of a load within which loads beside it are tried: up from one to begin with that is held, and below the limit
 _BESIDE = 0.01
-# first load that is tried where the bound is endless; it is doubled up to one over the width before nothing limits it
+# first load that is tried where the bound is endless; it is doubled up to one over the width before nothing limits it,
+# and made smaller down to the width
 _FIRST = 1.0
 
 
@@ -133,12 +135,25 @@ def held_limit(
 
 
 def _without_bound(on: RigidAssembly, steps: "_Steps", nothing: _Trial) -> HeldLimit:
-    """Return the limit below the first load that falls, doubled again and again; an endless one if none does."""
+    """Return the limit below the first load that falls, doubled again and again; an endless one if none does.
+
+    Where the first load of all falls, loads of 5, 2 and 1 · 10ᵏ below it are tried until one holds: the width is then
+    one of the limit, too.
+    """
     carried, best, load, problems = 0.0, nothing, _FIRST, 1
     while load * WIDTH <= _FIRST:
         trial = steps(load)
         problems += 1
         if not trial.holds:
+            smaller = cycle((0.5, 0.4, 0.5))
+            while carried == 0.0 and load > WIDTH * _FIRST:
+                less = next(smaller) * load
+                lower = steps(less)
+                problems += 1
+                if lower.holds:
+                    carried, best = less, lower
+                else:
+                    load, trial = less, lower
             unit = _unit(load)
             low, high = round(carried / unit), round(load / unit)
             tried = {0: nothing, low: best, high: trial}

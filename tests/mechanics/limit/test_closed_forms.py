@@ -357,12 +357,14 @@ class Stepping:
 
 
 @pytest.mark.parametrize(("limit", "most"), [(0.0077, 30), (0.333, 30), (1.0, 30), (90.0, 40)])
-def test_without_a_bound_loads_double_until_one_is_lost(monkeypatch, limit, most):
+def test_without_a_bound_loads_double_until_one_is_lost_or_halve_until_one_holds(monkeypatch, limit, most):
     monkeypatch.setattr(held, "_falling", lambda on, trial: None)
     steps = Stepping(limit)
     found = held._without_bound(None, steps, steps(0.0))
     assert found.held < limit <= found.lost
-    first = next(load for load in 2.0 ** np.arange(20) if load >= limit)
+    # two thousandths of the limit, whatever its size
+    below = [digit * 10.0**k for k in (-3, -2, -1) for digit in (1.0, 2.0, 5.0)]
+    first = next(load for load in (*below, *2.0 ** np.arange(20)) if load >= limit)
     assert found.lost - found.held == pytest.approx(held._unit(first))
     assert found.problems == len(set(steps.tried))
     assert len(steps.tried) <= most
