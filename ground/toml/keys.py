@@ -48,9 +48,12 @@ def keys_of(owner: type[Any], *required: str) -> tuple[Key, ...]:
     owner : dataclass
     required : names of keys that must be given, whatever their default in Python
 
-    >>> from mechanics.scene.scene import TimeSettings
-    >>> step = keys_of(TimeSettings)[0]
-    >>> step.name, step.kind.value, step.unit, step.default, step.above
+    >>> from dataclasses import make_dataclass
+    >>> from typing import Annotated
+    >>> from ground.settings import Setting
+    >>> step = Annotated[float, Setting("Time step.", "s", above=0)]
+    >>> (key,) = keys_of(make_dataclass("Times", [("step", step, 0.001)]))
+    >>> key.name, key.kind.value, key.unit, key.default, key.above
     ('step', 'a number', 's', 0.001, 0)
     """
     declared, keys = _declared(owner), []

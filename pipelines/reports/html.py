@@ -55,6 +55,7 @@ def table_of(
     known = quantities_of("row", *((bearer,) if isinstance(bearer, str) else bearer))
     rows = [cells(item) for item in items[:most]]
     names = tuple(rows[0]) if rows else ()
+    assert all(row.keys() == rows[0].keys() for row in rows), "rows of one table have the same names"
     head = tuple(known[name].heading for name in names)
     return Table(head, [tuple(row[name] for name in names) for row in rows], len(items))
 

@@ -35,6 +35,11 @@ def test_a_column_that_is_not_in_the_catalogue_is_refused():
         table_of("joint", [{"krn": "1"}], dict)
 
 
+def test_rows_of_one_table_have_the_same_names():
+    with pytest.raises(AssertionError, match="same names"):
+        table_of("joint", [{"kern": "1"}, {"kern": "2", "edge": "1"}], dict)
+
+
 @pytest.mark.parametrize("path", TEMPLATES, ids=lambda path: path.stem)
 def test_no_template_has_headings_of_its_own(path):
     assert not re.search(r"""table\([^)]*, \(["']""", path.read_text(encoding="utf-8"))
