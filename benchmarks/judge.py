@@ -78,7 +78,7 @@ def read_trace(path: Path) -> Trace:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run reached; the largest of the steps at its end, whose contacts were kept.
+    """Outcome that a run reached; the largest of the steps at its end, whose contacts were kept.
 
     Attributes
     ----------

@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def measured_rows(name: str, scene: Scene, records: Path | None = None) -> list[Row]:
-    """What each profile gives of a scene, against the finest mesh, and what it says of that itself."""
+    """Return what each profile gives of a scene, against the finest mesh, and what it says of that itself."""
     truth, _, _ = _kept(f"{name} finest", scene, _FINEST, records)
     rows = []
     for profile in PROFILES.values():
@@ -102,7 +102,7 @@ def measured_rows(name: str, scene: Scene, records: Path | None = None) -> list[
 
 
 def _run(scene: Scene, overlay: Overlay) -> tuple[Quantities, float, float]:
-    """What users care about, the part of the joints that is free, and the processor time [s]."""
+    """Return what users care about, the part of the joints that is free, and the processor time [s]."""
     begun = time.process_time()
     result = simulate(overlaid_scene(scene, overlay))
     return quantities(result), loops(result), time.process_time() - begun
@@ -314,7 +314,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -414,7 +414,7 @@ def _largest_errors(records: Path | None = None) -> dict[str, float]:
 
 
 def _hold(case: Case, value: float, profile: Profile, elastic: bool = False) -> tuple[Outcome, int]:
-    """Whether the case stands at a value, all loads at once from rest, and how many steps were left unsolved."""
+    """Return whether the case stands at a value, all loads at once from rest, and how many steps were left unsolved."""
     stones = case.stones(value)
     sideways = case.multiplier(value) * _GRAVITY
     scene = Scene(

@@ -58,7 +58,7 @@ class _Measured:
 
 
 def _is_refused(measured: _Measured) -> bool:
-    """Whether every method refuses it, in the same words: it is refused where it is stated."""
+    """Return whether every method refuses it, in the same words: it is refused where it is stated."""
     words = {cell.words for cell in measured.cells.values() if cell.outcome is Outcome.REFUSED}
     return len(words) == 1 and all(cell.outcome is Outcome.REFUSED for cell in measured.cells.values())
 

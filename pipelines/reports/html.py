@@ -52,11 +52,11 @@ def table_of(
     cells : gives the texts of a row by the names of their quantities, the same names for all items
     most : rows that are shown; None: all
     """
-    known = quantities_of("row", *((bearer,) if isinstance(bearer, str) else bearer))
+    quantities = quantities_of("row", *((bearer,) if isinstance(bearer, str) else bearer))
     rows = [cells(item) for item in items[:most]]
     names = tuple(rows[0]) if rows else ()
     assert all(row.keys() == rows[0].keys() for row in rows), "rows of one table have the same names"
-    head = tuple(known[name].heading for name in names)
+    head = tuple(quantities[name].heading for name in names)
     return Table(head, [tuple(row[name] for name in names) for row in rows], len(items))
 
 
@@ -154,6 +154,11 @@ def millimetres(metres: float, least: float = 0.0) -> str:
     if abs(metres) < least:
         return f"0 within {least * 1e3:.1g} mm"
     return f"{without_rounding(metres, 'm') * 1e3:z.4g} mm"
+
+
+def residual_cells(residual: Sequence[float]) -> dict[str, str]:
+    """Format the residuals of a control point along x, y and z [m], by the names of their quantities."""
+    return {f"residual_{axis}": f"{1e3 * value:z.1f} mm" for axis, value in zip("xyz", residual, strict=True)}
 
 
 def percent(part: float) -> str:

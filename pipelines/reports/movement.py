@@ -94,15 +94,11 @@ def _wall(wall: Mapping[str, Any]) -> dict[str, str]:
         "facade": wall["facade"],
         "zone": wall["zone"] or "–",
         "quantity": wall["quantity"],
-        **({"course": _known(wall["course"])} if "course" in wall else {}),
+        **({"course": "–" if wall["course"] is None else str(wall["course"])} if "course" in wall else {}),
         "chi2": f"{wall['chi2']:.1f}",
         "chi2_still": f"{wall['chi2_still']:.1f}",
         "dof": str(wall["dof"]),
     }
-
-
-def _known(number: int | None) -> str:
-    return "–" if number is None else str(number)
 
 
 def _course(course: Mapping[str, Any]) -> dict[str, str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.draw.photographs import draw_network, draw_photo_residuals
-from pipelines.reports.html import MAX_ROWS, picture, table_of, write_page
+from pipelines.reports.html import MAX_ROWS, picture, residual_cells, table_of, write_page
 
 Row = tuple[str, ...]
 
@@ -132,10 +132,7 @@ def _control(point: Mapping[str, Any]) -> dict[str, str]:
     return {
         "id": point["id"],
         "use": point["use"],
-        **{
-            f"residual_{axis}": f"{1e3 * value:z.1f} mm"
-            for axis, value in zip("xyz", point["residual"], strict=True)
-        },
+        **residual_cells(point["residual"]),
         "test": "–" if point["use"] == "fixed" else f"{point['test']:.2f}",
     }
 

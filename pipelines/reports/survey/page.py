@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipelines.reports.html import MAX_ROWS, Table, picture, table_of, write_page
+from pipelines.reports.html import MAX_ROWS, Table, picture, residual_cells, table_of, write_page
 from pipelines.reports.page.model import Column
 from pipelines.reports.page.surveys import survey_model
 from pipelines.reports.survey.campaigns import MovedStone, comparison_lines
@@ -159,11 +159,11 @@ def _remeasure_row(remeasure: Remeasure) -> Row:
 def _movements(study: SurveyStudy) -> Iterator[Row]:
     """Yield what the beds of each wall tell: wall, finding, age, probability, what is excluded."""
     for wall in study.beds:
-        found = [
+        findings = [
             (movement.text, movement.dating, _percent(movement.probability)) for movement in wall.movements
         ]
         none = "not tested: too few stones" if wall.excluded is None else "no movement found"
-        for text, dating, probability in found or [(none, "–", "–")]:
+        for text, dating, probability in findings or [(none, "–", "–")]:
             yield {
                 "wall": _place(wall),
                 "text": text,
@@ -181,9 +181,9 @@ def _faces(study: SurveyStudy) -> Iterator[Row]:
             if math.isfinite(wall.lean_sigma)
             else "–"
         )
-        found = [(movement.text, _percent(movement.probability)) for movement in wall.movements]
+        findings = [(movement.text, _percent(movement.probability)) for movement in wall.movements]
         none = "not tested" if wall.excluded is None else "no movement found"
-        for text, probability in found or [(none, "–")]:
+        for text, probability in findings or [(none, "–")]:
             yield {
                 "wall": _place(wall),
                 "lean": lean,
@@ -283,10 +283,7 @@ def _control(files: Iterable[SurveyFile]) -> Iterator[dict[str, Any]]:
         rows = [
             {
                 "name": name,
-                **{
-                    f"residual_{axis}": f"{value * 1e3:z.1f} mm"
-                    for axis, value in zip("xyz", residual, strict=True)
-                },
+                **residual_cells(residual),
                 "standardised": "–" if math.isnan(test) else f"{test:.2f}",
                 "limit": "–" if math.isnan(limit) else f"{limit:.2f}",
                 "rejected": "left out as a blunder" if name in fit.rejected else "",
@@ -342,7 +339,7 @@ def _course_row(
 
 
 def _kind_row(study: SurveyStudy, kind: KindStandard) -> Row:
-    odd = [one for one in study.deviations if one.kind == kind.kind and one.worst > SIGNIFICANT]
+    odd = [stone for stone in study.deviations if stone.kind == kind.kind and stone.worst > SIGNIFICANT]
     odd.sort(key=lambda stone: -stone.worst)
     named = (
         f"{stone.code} ({stone.length * 1e3:+z.0f} mm long, {stone.height * 1e3:+z.0f} mm high)"
